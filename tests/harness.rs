@@ -293,22 +293,10 @@ pub struct Events(Pin<Box<dyn Stream<Item = Value> + Send>>);
 
 impl Events {
     fn of(response: Response) -> Events {
-        let events = response.bytes_stream().eventsource();
-        // A connection that breaks ends the stream, as for any client that will come back.
-        let events = events
-            .take_while(|event| std::future::ready(event.is_ok()))
-            .map(|event| {
-                let event = event.unwrap();
-                let data: Value = serde_json::from_str(&event.data).unwrap();
-                assert_eq!(
-                    (event.id, event.event),
-                    (
-                        data["seq"].to_string(),
-                        data["type"].as_str().unwrap().to_string()
-                    )
-                );
-                data
-            });
+        let events = server_sent(response).map(|(id, data)| {
+            assert_eq!(id, data["seq"].to_string());
+            data
+        });
         Events(Box::pin(events))
     }
 
@@ -331,6 +319,19 @@ impl std::fmt::Debug for Events {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Events")
     }
+}
+
+/// The server-sent events of an answer: the id of each, and its data, whose type is checked.
+pub fn server_sent(response: Response) -> impl Stream<Item = (String, Value)> + Send + use<> {
+    let events = response.bytes_stream().eventsource();
+    // A connection that breaks ends the stream, as for any client that will come back.
+    let events = events.take_while(|event| std::future::ready(event.is_ok()));
+    events.map(|event| {
+        let event = event.unwrap();
+        let data: Value = serde_json::from_str(&event.data).unwrap();
+        assert_eq!(data["type"], event.event);
+        (event.id, data)
+    })
 }
 
 /// A client that asks the server itself, whatever proxy the environment names.

@@ -62,6 +62,8 @@ pub enum Progress<'a> {
     /// A load step that is not the last has ended: the solution so far, without fields. Sent for problems with several
     /// steps only, and not on the meshes of adaptive refinement.
     Step(&'a Solution),
+    /// A mesh of adaptive refinement is solved, and a finer one follows: the solution on it, without fields.
+    Mesh(&'a Solution),
     /// The solution cannot go on without this memory, which the observer or the machine refuses. An observer that does
     /// not stop the solver now gets a solution that has not converged, or an error.
     OutOfMemory {

@@ -49,7 +49,7 @@ pub fn run(
                 observer,
                 seen: |progress| match progress {
                     Progress::Iteration(row) => Some(Progress::Tentative(row)),
-                    Progress::Step(_) => None,
+                    Progress::Step(_) | Progress::Mesh(_) => None,
                     other => Some(other),
                 },
             };

@@ -17,12 +17,32 @@ use crate::{SIGNORINI, server};
 
 /// Who may use which operation: written down here once more, and not taken from the service.
 const POLICY: &[(&str, &[&str])] = &[
-    ("open", &["GetError", "GetWarning", "Live", "Ready"]),
+    (
+        "open",
+        &[
+            "CreateSession",
+            "DeleteSession",
+            "GetError",
+            "GetHome",
+            "GetWarning",
+            "Live",
+            "Ready",
+        ],
+    ),
     ("identified", &["GetCaller"]),
     (
         "read",
         &[
             "GetJob",
+            "GetJobDescription",
+            "GetJobView",
+            "GetJobFieldView",
+            "GetMeshView",
+            "PreviewProblem",
+            "ConvertDeck",
+            "ListExamples",
+            "ListWaiting",
+            "WatchJobs",
             "ListJobs",
             "CountJobs",
             "GetJobTable",
@@ -45,7 +65,6 @@ const POLICY: &[(&str, &[&str])] = &[
             "GetOpenApi",
             "GetProto",
             "GetDocs",
-            "GetHome",
             "GetDocsFile",
             "GetMetrics",
         ],
@@ -212,6 +231,7 @@ async fn every_route_is_for_those_whom_the_policy_names() {
                 .replace("{hash}", &format!("sha256:{}", "0".repeat(64)))
                 .replace("{boundary}", "top")
                 .replace("{plot}", "mesh.svg")
+                .replace("{field}", "von_mises")
                 .replace("{number}", "0")
                 .replace("{name}", "punch")
                 .replace("{token}", "000000000000")

@@ -92,33 +92,6 @@ async fn every_described_route_exists_and_has_the_described_parameters() {
     }
 }
 
-/// Operations: GetHome
-#[tokio::test]
-async fn a_browser_finds_a_page_with_the_last_jobs() {
-    let server = server().await;
-    let page = async || {
-        let answer = server.get("/").send().await.unwrap();
-        assert_eq!(answer.headers()["content-type"], "text/html; charset=utf-8");
-        answer.text().await.unwrap()
-    };
-    assert!(page().await.contains("There are none yet"));
-    let body =
-        serde_json::json!({ "problem": suite::example_json("sheet"), "name": "my sheet & co" });
-    let job = server.solve(&body).await;
-    let html = page().await;
-    let id = job["id"].as_str().unwrap();
-    assert!(
-        html.contains(&format!(
-            "<a href=v1/jobs/{id}>my sheet &amp; co</a>: succeeded, "
-        )),
-        "{html}"
-    );
-    let figure = html.split("src=\"").nth(1).unwrap();
-    let figure = figure.split('"').next().unwrap();
-    let figure = server.get(&format!("/{figure}")).send().await.unwrap();
-    assert_eq!(figure.headers()["content-type"], "image/svg+xml");
-}
-
 /// Operations: GetDocs, GetDocsFile
 #[tokio::test]
 async fn the_page_of_the_api_loads_files_from_this_service_only() {

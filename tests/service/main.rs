@@ -24,19 +24,23 @@ mod list;
 mod logs;
 mod meshes;
 mod owners;
+mod page;
 mod plots;
 mod rest_and_grpc_agree;
 mod restart;
 mod results;
 mod same_errors;
+mod session;
 mod shares;
 mod solve_command;
 mod submit;
 mod sweeps;
 mod validate;
 mod verify;
+mod views;
 mod waiting;
 mod watch;
+mod watch_list;
 
 /// The binary under test.
 const SIGNORINI: &str = env!("CARGO_BIN_EXE_signorini");

@@ -66,7 +66,8 @@ async fn nobody_sees_or_changes_what_another_owner_has() {
     for (route, methods) in openapi["paths"].as_object().unwrap() {
         for (method, operation) in methods.as_object().unwrap() {
             let id = operation["operationId"].as_str().unwrap();
-            if ["admin", "open"].contains(&access_of(id)) {
+            // what is streamed of a list does not end: watch_list.rs has a test of its own
+            if ["admin", "open"].contains(&access_of(id)) || id == "WatchJobs" {
                 continue;
             }
             let path = route
@@ -75,6 +76,7 @@ async fn nobody_sees_or_changes_what_another_owner_has() {
                 .replace("{hash}", &mesh)
                 .replace("{boundary}", "top")
                 .replace("{plot}", "mesh.svg")
+                .replace("{field}", "von_mises")
                 .replace("{number}", "0");
             let of_one = ["{id}", "{hash}"].iter().any(|part| route.contains(part));
             let mut request = server.request(method.to_uppercase().parse().unwrap(), &path);

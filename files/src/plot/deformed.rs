@@ -161,6 +161,22 @@ struct Surface<'a> {
     rough: bool,
 }
 
+/// The faces of obstacles where they ended, at the scale of the body, each with the name of its boundary.
+pub(super) fn faces_after<'p>(
+    problem: &Problem,
+    profiles: &'p BTreeMap<String, ContactProfile>,
+    fields: &Fields,
+) -> Vec<(&'p str, Vec<[f64; 2]>)> {
+    let body = Body { fields };
+    if body.check().is_err() {
+        return vec![];
+    }
+    let surfaces = body.surfaces(problem, profiles);
+    let faces = profiles.keys().zip(&surfaces);
+    let faces = faces.map(|(name, surface)| (&name[..], surface.face(&body, 1.0).points));
+    faces.filter(|(_, points)| points.len() > 1).collect()
+}
+
 impl Surface<'_> {
     fn face(&self, body: &Body<'_>, factor: f64) -> Face {
         if !self.faces {

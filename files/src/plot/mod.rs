@@ -13,6 +13,8 @@
 //! | pieces: a body, a field in colours, the outline of a region, an obstacle | `body`, `bands`, `region`, `obstacle` |
 //! | the page, its texts, sizes, limits of axes, colours, numbers | `page`, `caption`, `style`, `limits`, `theme`, `numbers` |
 //! | PNG and PDF | `image` |
+//! | a problem in words | `description` |
+//! | compact arrays for programs that draw themselves | `view` |
 
 mod axis;
 mod bands;
@@ -20,6 +22,7 @@ mod body;
 mod caption;
 mod convergence;
 mod deformed;
+mod description;
 mod figure;
 pub mod image;
 mod limits;
@@ -32,6 +35,7 @@ mod profile;
 mod region;
 mod style;
 mod theme;
+pub mod view;
 
 use std::collections::BTreeMap;
 
@@ -39,12 +43,14 @@ pub use axis::within;
 pub use caption::{Caption, Mark};
 pub use convergence::convergence_svg;
 pub use deformed::deformed_svg;
+pub use description::description;
 pub use figure::{Above, Curve, LineStyle, Panel, Scale, Shade, ShadeKind, figure};
 pub use limits::{AxisLimits, Limits};
 pub use mesh::mesh_svg;
 pub use profile::{ProfileView, profile_svg};
 pub use style::{Size, Stress, Style, Texts};
 pub use theme::Theme;
+pub use view::ViewField;
 
 use solver::mesh::Mesh;
 use solver::problem::Problem;

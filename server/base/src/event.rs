@@ -116,6 +116,24 @@ pub struct TimedIteration {
     pub wall_s: f64,
 }
 
+/// A row of the history of a job, with the number of its event.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct HistoryRow {
+    /// The number of the row's event, after which a stream of events goes on; absent once the job has ended with a result.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seq: Option<i64>,
+    /// The row.
+    #[serde(flatten)]
+    pub timed: TimedIteration,
+}
+
+impl From<TimedIteration> for HistoryRow {
+    /// The row of a result.
+    fn from(timed: TimedIteration) -> Self {
+        HistoryRow { seq: None, timed }
+    }
+}
+
 impl Payload {
     /// The word for the kind of event: the value of `type` in JSON.
     pub fn kind(&self) -> &'static str {

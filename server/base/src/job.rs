@@ -1,6 +1,6 @@
 //! A job: its identity, its status and how that may change. No I/O.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -112,6 +112,36 @@ pub struct Job {
     pub warnings: Vec<Warning>,
     /// Addresses of related resources.
     pub links: BTreeMap<String, String>,
+}
+
+/// Implements the choice of some fields of a job: those that clients see, by their names.
+macro_rules! fields {
+    ($($name:ident)*) => {
+        impl Job {
+            /// The names of the fields that clients see, in the order in which they are written.
+            pub const FIELDS: &[&str] = &[$(stringify!($name)),*];
+
+            /// The job with these fields only: the others have the values of an empty job.
+            pub fn with_fields(self, wanted: &BTreeSet<&str>) -> Job {
+                let empty = Job::default();
+                // all of them by name, so that a new one is not forgotten
+                Job {
+                    key: self.key,
+                    mesh: self.mesh,
+                    memory_bytes: self.memory_bytes,
+                    coalesced_into: self.coalesced_into,
+                    cache: self.cache,
+                    $($name: if wanted.contains(stringify!($name)) { self.$name } else { empty.$name },)*
+                }
+            }
+        }
+    };
+}
+
+fields! {
+    id status reason cancel_requested version name labels owner priority attempt max_attempts input_hash cached_from
+    parent sweep pinned created_at started_at finished_at queue_wait_s run_s queue progress limits failure
+    result_available stored_bytes verdict quantities warnings links
 }
 
 impl Job {
@@ -287,7 +317,8 @@ pub enum ResultAvailable {
     /// No result.
     #[default]
     None,
-    /// The last state of a job that did not converge or was canceled, or the finished load steps of a running job.
+    /// The last state of a job that did not converge or was canceled; of a running job the finished load steps, or the mesh of
+    /// adaptive refinement that was solved last.
     Partial,
     /// A converged result.
     Final,
@@ -407,6 +438,33 @@ pub struct Progress {
     pub mesh_elements: Option<u64>,
     /// The largest relative error on the mesh before the present one.
     pub mesh_error: Option<f64>,
+    /// Residuals of the iterations from the first on, for a small curve: of each of the first 32 iterations, then of every
+    /// second, fourth, … one. Each has three digits.
+    #[serde(default)]
+    pub residuals: Vec<f64>,
+}
+
+impl Progress {
+    /// The largest number of residuals.
+    const MOST: u32 = 32;
+
+    /// Adds the residual of iteration `k` (from 1) to those for a small curve; iterations come one after another.
+    pub fn add_residual(&mut self, k: u32, residual: f64) {
+        let every = |k: u32| k.div_ceil(Progress::MOST).next_power_of_two();
+        if k <= 1 {
+            self.residuals.clear();
+        } else if every(k) > every(k - 1) {
+            let mut even = false;
+            self.residuals.retain(|_| {
+                even = !even;
+                even
+            });
+        }
+        if (k.max(1) - 1).is_multiple_of(every(k)) && residual.is_finite() {
+            self.residuals
+                .push(format!("{residual:.2e}").parse().unwrap_or(residual));
+        }
+    }
 }
 
 /// Why a job failed, in the form of a problem document.
@@ -457,6 +515,30 @@ pub fn without_solution(outcome: Outcome, iterations: u32, residuals: &Residuals
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn the_small_curve_has_evenly_spaced_residuals_from_the_first_on() {
+        let mut progress = Progress::default();
+        for k in 1..=1000_u32 {
+            progress.add_residual(k, f64::from(k));
+            let found = &progress.residuals;
+            let every = k.div_ceil(32).next_power_of_two();
+            let expected = (1..=k).step_by(every as usize).map(f64::from);
+            assert_eq!(*found, expected.collect::<Vec<_>>(), "{k}");
+            assert!(found.len() <= 32);
+        }
+        progress.add_residual(1, 0.123_456);
+        assert_eq!(progress.residuals, [0.123]);
+    }
+
+    #[test]
+    fn the_names_of_fields_are_those_in_json_in_the_same_order() {
+        let text = serde_json::to_string(&Job::default()).unwrap();
+        let place = |name: &&&str| text.find(&format!("\"{name}\":")).unwrap();
+        assert!(Job::FIELDS.is_sorted_by_key(|name| place(&name)));
+        let written: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(written.as_object().unwrap().len(), Job::FIELDS.len());
+    }
 
     /// The statuses that a job of that status may change to.
     fn becomes(from: Status) -> Vec<Status> {

@@ -10,22 +10,7 @@ use clap::Args;
 use super::{exit::Exit, output};
 
 /// The name and JSON of each problem of chapter 4 of the thesis.
-pub(super) const ALL: [(&str, &str); 5] = [
-    (
-        "rectangular_punch",
-        include_str!("../../../examples/rectangular_punch.json"),
-    ),
-    ("cylinder", include_str!("../../../examples/cylinder.json")),
-    (
-        "annular_punch",
-        include_str!("../../../examples/annular_punch.json"),
-    ),
-    (
-        "cylinder_on_end",
-        include_str!("../../../examples/cylinder_on_end.json"),
-    ),
-    ("sheet", include_str!("../../../examples/sheet.json")),
-];
+pub(super) const ALL: [(&str, &str); 5] = service::verbs::examples::OF_THE_THESIS;
 
 macro_rules! files {
     ($($path:literal)*) => {

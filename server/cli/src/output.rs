@@ -238,7 +238,7 @@ impl Output {
                 Some(profile) => formats::profile(profile, self.format),
                 None => Err(format!("the result has no profile of {boundary:?}")),
             },
-            Part::History => formats::history(&document.history, self.format),
+            Part::History => formats::history(&formats::rows_of(&document.history), self.format),
             Part::Fields => formats::fields(&document.fields, self.format),
             Part::Plot(plot) => {
                 let history: Vec<Iteration> = document

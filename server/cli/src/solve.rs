@@ -156,7 +156,10 @@ impl Observer for Shown<'_> {
             } => view.line(&report::mesh(number, elements, error)),
             Progress::Iteration(row) => view.iteration(row),
             Progress::Warning(warning) => view.warning(warning),
-            Progress::Tentative(_) | Progress::Step(_) | Progress::OutOfMemory { .. } => Ok(()),
+            Progress::Tentative(_)
+            | Progress::Step(_)
+            | Progress::Mesh(_)
+            | Progress::OutOfMemory { .. } => Ok(()),
         };
         // who no longer reads what is shown still wants the result
         let _ = shown;

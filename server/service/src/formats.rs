@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 
 use base::{
-    event::TimedIteration,
+    event::{HistoryRow, TimedIteration},
     run::Document,
     sweep::{MemberRow, ParameterValue},
     text::size,
@@ -42,6 +42,8 @@ pub enum Format {
     Png,
     /// A figure as PDF.
     Pdf,
+    /// Compact arrays of a body or a field, for programs that draw themselves.
+    View,
 }
 
 impl Format {
@@ -86,6 +88,7 @@ impl Format {
             Format::Svg => "image/svg+xml",
             Format::Png => "image/png",
             Format::Pdf => "application/pdf",
+            Format::View => "application/vnd.signorini.view",
         }
     }
 
@@ -109,18 +112,31 @@ pub fn profile(profile: &ContactProfile, format: Format) -> Result<Vec<u8>, Stri
     rows(profile, Table::of_profile, format)
 }
 
+/// The rows of a history that is that of a result.
+pub fn rows_of(history: &[TimedIteration]) -> Vec<HistoryRow> {
+    history.iter().cloned().map(Into::into).collect()
+}
+
 /// Writes a history in this format. The error is the reason why it cannot be written.
-pub fn history(history: &[TimedIteration], format: Format) -> Result<Vec<u8>, String> {
+pub fn history(history: &[HistoryRow], format: Format) -> Result<Vec<u8>, String> {
     rows(history, history_table, format)
 }
 
-/// The table of a history: the solver's columns, and the columns of times.
-fn history_table(history: &[TimedIteration]) -> Table {
-    let mut table = Table::of_history(history.iter().map(|timed| &timed.row));
+/// The table of a history: the solver's columns, the column of times and, while the job has not ended, that of the events'
+/// numbers.
+fn history_table(history: &[HistoryRow]) -> Table {
+    let mut table = Table::of_history(history.iter().map(|row| &row.timed.row));
     table.columns.push(Column {
         name: "wall_s".into(),
-        values: Values::Real(history.iter().map(|timed| timed.wall_s).collect()),
+        values: Values::Real(history.iter().map(|row| row.timed.wall_s).collect()),
     });
+    if history.iter().any(|row| row.seq.is_some()) {
+        let seq = |row: &HistoryRow| row.seq.map_or(f64::NAN, |seq| seq as f64);
+        table.columns.push(Column {
+            name: "seq".into(),
+            values: Values::Real(history.iter().map(seq).collect()),
+        });
+    }
     table
 }
 
@@ -159,7 +175,7 @@ pub fn write_table(table: &Table, format: Format) -> Result<Vec<u8>, String> {
             bytes if bytes > MOST_PADDED_BYTES => Err(too_wide(bytes)),
             _ => files::npz::file(table),
         },
-        Format::Json | Format::Vtu | Format::Svg | Format::Png | Format::Pdf => {
+        Format::Json | Format::Vtu | Format::Svg | Format::Png | Format::Pdf | Format::View => {
             Err(format!("rows are not written as {}", format.name()))
         }
     }
@@ -275,9 +291,13 @@ pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
         Format::Json => serde_json::to_vec(fields).map_err(|error| error.to_string()),
         Format::Npz => files::fields::npz(fields),
         Format::Vtu => files::vtu::file(fields),
-        Format::Csv | Format::Jsonl | Format::Arrow | Format::Svg | Format::Png | Format::Pdf => {
-            Err(format!("fields are not written as {}", format.name()))
-        }
+        Format::Csv
+        | Format::Jsonl
+        | Format::Arrow
+        | Format::Svg
+        | Format::Png
+        | Format::Pdf
+        | Format::View => Err(format!("fields are not written as {}", format.name())),
     }
 }
 
@@ -286,7 +306,7 @@ pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
 pub fn everything_as_npz(document: &Document) -> Result<Vec<u8>, String> {
     let mut npz = Npz::new();
     files::fields::add(&mut npz, "fields/", &document.fields)?;
-    npz.table("history/", &history_table(&document.history))?;
+    npz.table("history/", &history_table(&rows_of(&document.history)))?;
     for (boundary, profile) in &document.profiles {
         npz.table(
             &format!("profiles/{boundary}/"),
@@ -322,7 +342,7 @@ mod tests {
             let top = profile(&solution.profiles["top"], *format);
             assert_eq!(top.is_ok(), expected, "{name}");
             let rows = [fake::timed(1), fake::timed(2)];
-            assert_eq!(history(&rows, *format).is_ok(), expected);
+            assert_eq!(history(&rows_of(&rows), *format).is_ok(), expected);
         }
         let top = &solution.profiles["top"];
         let csv = String::from_utf8(profile(top, Format::Csv).unwrap()).unwrap();
@@ -335,10 +355,10 @@ mod tests {
     #[test]
     fn a_row_of_history_ends_with_its_time() {
         let rows = [fake::timed(1), fake::timed(2)];
-        let jsonl = String::from_utf8(history(&rows, Format::Jsonl).unwrap()).unwrap();
+        let jsonl = String::from_utf8(history(&rows_of(&rows), Format::Jsonl).unwrap()).unwrap();
         assert!(jsonl.lines().next().unwrap().ends_with(r#""wall_s":0.5}"#));
         let json: serde_json::Value =
-            serde_json::from_slice(&history(&rows, Format::Json).unwrap()).unwrap();
+            serde_json::from_slice(&history(&rows_of(&rows), Format::Json).unwrap()).unwrap();
         assert_eq!(
             (&json[1]["k"], &json[1]["wall_s"]),
             (&2.into(), &1.0.into())

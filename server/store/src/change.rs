@@ -22,6 +22,7 @@ use rusqlite::Connection;
 use tracing::info;
 
 use super::{
+    changes::Changed,
     checksum::Value,
     content::{self, Holder, name},
     damage::Damages,
@@ -49,6 +50,8 @@ pub(super) struct Change<'a> {
     next_key: Option<i64>,
     /// The keys of the jobs whose status has changed: their watchers are woken after the commit.
     changed: Vec<i64>,
+    /// What those who follow lists are told after the commit.
+    noted: BTreeSet<Changed>,
     /// The lines about jobs that end or are deleted, which are logged after the commit.
     log_lines: Vec<(JobId, LogLine)>,
 }
@@ -99,6 +102,7 @@ impl Writer<'_> {
             unwritten: BTreeSet::new(),
             next_key: None,
             changed: vec![],
+            noted: BTreeSet::new(),
             log_lines: vec![],
         })
     }
@@ -145,6 +149,7 @@ impl Change<'_> {
         };
         self.keep(key, cached)?;
         self.unwritten.insert(key);
+        self.noted.insert(Changed::Job(key));
         Ok(key)
     }
 
@@ -168,6 +173,12 @@ impl Change<'_> {
         let job = new.job.clone();
         let old = mem::replace(&mut cached.row, new).job;
         self.unwritten.insert(key);
+        let only_progress = old.version == job.version && old.status == job.status;
+        self.noted.insert(if only_progress {
+            Changed::Progress(key)
+        } else {
+            Changed::Job(key)
+        });
         if old.status != job.status {
             self.changed.push(key);
         }
@@ -230,6 +241,7 @@ impl Change<'_> {
         let now = self.now();
         rows::delete(self.sql()?, job, now)?;
         self.rows.remove(&job.key);
+        self.noted.insert(Changed::Job(job.key));
         self.changed.push(job.key);
         self.log_lines.push((job.id, LogLine::Deleted));
         Ok(())
@@ -412,6 +424,7 @@ impl Change<'_> {
         let waiting = self.waiting()?;
         self.tx.commit()?;
         self.store.note_waiting(waiting);
+        self.store.changes.note(self.noted);
         self.log_lines.iter().for_each(|(id, line)| line.log(*id));
         Ok(self.changed)
     }

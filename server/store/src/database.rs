@@ -18,6 +18,7 @@ use rusqlite::{Connection, Transaction, TransactionBehavior};
 use tokio::sync::{mpsc, watch};
 
 use super::{
+    changes::Changes,
     compact,
     connections::{Connections, Lease, Mode, blocking, closed, open},
     damage::Damages,
@@ -66,6 +67,8 @@ pub struct Store {
     pub(super) inbox: Inbox,
     /// The keys of running jobs that a client has canceled, even if that could not be stored yet.
     pub(super) cancels: Mutex<HashSet<i64>>,
+    /// What has changed lately.
+    pub(super) changes: Changes,
     /// The record of what was found damaged.
     pub(super) damages: Arc<Damages>,
     /// Whether the request keys were read since the store was opened.
@@ -224,6 +227,7 @@ impl Store {
             budget: OnceLock::new(),
             inbox,
             cancels: Mutex::default(),
+            changes: Changes::default(),
             intact: Arc::default(),
             ahead: AtomicI64::default(),
             pauses: Pauses::default(),

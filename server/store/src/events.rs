@@ -60,13 +60,20 @@ impl Store {
     }
 }
 
-/// The iterations of one attempt of a job, each as the JSON of its event, in order.
-pub(super) fn iterations(connection: &Connection, key: i64, attempt: i32) -> Result<Vec<String>> {
+/// The iterations of one attempt of a job, each as the number and the JSON of its event, in order.
+pub(super) fn iterations(
+    connection: &Connection,
+    key: i64,
+    attempt: i32,
+) -> Result<Vec<(i64, String)>> {
     connection.rows(
         "select seq, attempt, t, type, body, checksum from event
          where job_id = ? and attempt = ? and type = 'iteration' order by seq",
         (key, attempt),
-        |row| Ok(checked(key, row)?.1.to_owned()),
+        |row| {
+            let (seq, body) = checked(key, row)?;
+            Ok((seq, body.to_owned()))
+        },
     )
 }
 

@@ -4,16 +4,17 @@
 use base::{
     caller::Owners,
     id::Ids,
-    job::{Status, SweepId},
+    job::{JobId, Status, SweepId},
     time::Time,
     values::{Text, Times, Values, Words},
 };
 use rusqlite::types::Value;
-use solver::solution::Verdict;
+use solver::solution::{Verdict, WarningCode};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// All filters except the one by labels, whose name in requests depends on the label. Each line has the field of
-/// [`Filter`], its type, the name in requests (that of the field in the proto), the column and the comparison, the
+/// [`Filter`], its type, the name in requests (that of the field in the proto), the column and the comparison
+/// ([`Comparison`]), the
 /// index that lists the jobs of a value in order of arrival, if there is one, and the meaning. `$use` is a macro that
 /// receives the lines.
 #[macro_export]
@@ -22,10 +23,19 @@ macro_rules! job_filters {
         $use! {
             statuses: Vec<Status>, status, "status" "=", Some("job_by_status"),
                 "Only jobs with this status; several may be given";
+            ids: Vec<JobId>, id, "uuid" "=", None, "Only jobs with this id; several may be given";
             owner: Option<String>, owner, "owner" "=", Some("job_by_owner"), "Only jobs of this owner";
             name: Option<String>, name, "name" "=", Some("job_by_name"), "Only jobs with this name";
+            name_contains: Option<String>, name_contains, "name" "contains", None,
+                "Only jobs whose name contains this text, whatever the case of the letters A to Z";
+            text: Option<String>, text, "name" "mentions", None,
+                "Only jobs that have this text in their name, title, owner, id or labels, whatever the case of the letters A to Z";
             verdicts: Vec<Verdict>, verdict, "verdict" "=", Some("job_by_verdict"),
                 "Only jobs with this verdict on their result; several may be given";
+            warnings: Vec<WarningCode>, warning, "warnings" "has", None,
+                "Only jobs that have one of these warnings among the five worst; several may be given";
+            parent: Option<JobId>, parent, "parent" "=", None, "Only jobs that retry this job";
+            pinned: Option<bool>, pinned, "pinned" "=", None, "Only jobs that are kept permanently (true), or the others (false)";
             input_hash: Option<String>, input_hash, "input_hash" "=", Some("job_by_input"),
                 "Only jobs with this fingerprint of the problem";
             sweep: Option<SweepId>, sweep, "sweep" "=", Some("job_by_sweep"), "Only jobs of this sweep";
@@ -49,6 +59,8 @@ macro_rules! define {
             $(#[doc = $meaning] pub $field: $type,)*
             /// Only jobs with all of these labels.
             pub labels: Vec<(String, String)>,
+            /// Only jobs with none of these labels.
+            pub excluded_labels: Vec<(String, String)>,
         }
 
         /// All filters except the one by labels.
@@ -60,7 +72,7 @@ macro_rules! define {
             expected: || <$type as Criterion>::Value::allowed().expected(),
             set: |filter, text| filter.$field.set(text),
             column: $column,
-            comparison: $comparison,
+            comparison: Comparison::of($comparison),
             index: $index,
             values: |filter| filter.$field.stored(),
         }),*];
@@ -84,10 +96,40 @@ pub struct Field {
     /// Adds the value that this text stands for; false if the text is not allowed.
     pub set: fn(&mut Filter, &str) -> bool,
     pub(super) column: &'static str,
-    pub(super) comparison: &'static str,
+    pub(super) comparison: Comparison,
     pub(super) index: Option<&'static str>,
     /// The values in a filter, in the form in which the column has them.
     pub(super) values: fn(&Filter) -> Vec<Value>,
+}
+
+/// How a filter compares the column of a job with its values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Comparison {
+    /// The column is one of the values: `=`.
+    Is,
+    /// The column is the value or later: `>=`.
+    From,
+    /// The column is before the value: `<`.
+    Before,
+    /// The text of the column contains the value: `contains`.
+    Contains,
+    /// One of the columns in which people look for a text contains the value: `mentions`.
+    Mentions,
+    /// The JSON of the column has one of the values as a `code`: `has`.
+    HasCode,
+}
+
+impl Comparison {
+    const fn of(word: &str) -> Comparison {
+        match word.as_bytes() {
+            b"=" => Comparison::Is,
+            b">=" => Comparison::From,
+            b"<" => Comparison::Before,
+            b"contains" => Comparison::Contains,
+            b"mentions" => Comparison::Mentions,
+            _ => Comparison::HasCode,
+        }
+    }
 }
 
 /// The type of a filter's values.
@@ -114,6 +156,36 @@ impl Asked for Verdict {
 
     fn stored(&self) -> Value {
         Value::Text(<&str>::from(*self).to_owned())
+    }
+}
+
+impl Asked for WarningCode {
+    fn allowed() -> impl Values<Value = Self> {
+        Words::all()
+    }
+
+    fn stored(&self) -> Value {
+        Value::Text(format!("\"code\":\"{}\"", self.as_str()))
+    }
+}
+
+impl Asked for bool {
+    fn allowed() -> impl Values<Value = Self> {
+        Words(|| vec![("false", false), ("true", true)])
+    }
+
+    fn stored(&self) -> Value {
+        Value::Integer(i64::from(*self))
+    }
+}
+
+impl Asked for JobId {
+    fn allowed() -> impl Values<Value = Self> {
+        Ids::all()
+    }
+
+    fn stored(&self) -> Value {
+        Value::Text(self.0.to_string())
     }
 }
 
@@ -193,6 +265,8 @@ impl<T: Asked> Criterion for Vec<T> {
 }
 
 impl Filter {
+    /// The largest number of ids in one filter.
+    pub const MOST_IDS: usize = 1000;
     /// The largest number of labels in one filter.
     pub const MOST_LABELS: usize = 64;
 
@@ -201,10 +275,16 @@ impl Filter {
         self.statuses
             .sort_unstable_by_key(|status| <&str>::from(*status));
         self.statuses.dedup();
+        self.ids.sort_unstable_by_key(|id| id.0);
+        self.ids.dedup();
         self.verdicts.sort_unstable();
         self.verdicts.dedup();
-        self.labels.sort_unstable();
-        self.labels.dedup();
+        self.warnings.sort_unstable_by_key(|code| code.as_str());
+        self.warnings.dedup();
+        for labels in [&mut self.labels, &mut self.excluded_labels] {
+            labels.sort_unstable();
+            labels.dedup();
+        }
         self
     }
 
@@ -232,11 +312,11 @@ impl Filter {
 pub struct Order {
     /// The time to sort by.
     pub by: OrderBy,
-    /// Whether the latest time is first.
+    /// Whether the latest or longest time is first.
     pub descending: bool,
 }
 
-/// The time that orders a list. The name of the variant is that of the column.
+/// The time that orders a list. The name of the variant is that of the field of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum OrderBy {
@@ -244,25 +324,61 @@ pub enum OrderBy {
     CreatedAt,
     /// When the jobs ended; jobs that have not ended are left out.
     FinishedAt,
+    /// How long the jobs have run; jobs that have not ended, or never started, are left out.
+    RunS,
+}
+
+impl OrderBy {
+    /// The expression that orders the rows, and the index that has it for the jobs that satisfy the condition.
+    pub(super) fn sql(self) -> (&'static str, &'static str, &'static str) {
+        match self {
+            OrderBy::CreatedAt => ("job.created_at", "job_by_created", "true"),
+            OrderBy::FinishedAt => (
+                "job.finished_at",
+                "job_by_finished",
+                "job.finished_at is not null",
+            ),
+            OrderBy::RunS => (
+                "(job.finished_at - job.started_at)",
+                "job_by_run_time",
+                "job.finished_at is not null and job.started_at is not null",
+            ),
+        }
+    }
 }
 
 /// The last job of a page, after which the next one begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cursor {
-    /// The time of the last job by which the list is ordered (µs).
+    /// The time of the last job by which the list is ordered, as a point in time or a duration (µs).
     pub micros: i64,
     /// The key of the last job.
     pub key: i64,
 }
 
-/// The property by which jobs are counted. The name of the variant is that of the column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
-#[strum(serialize_all = "snake_case")]
+/// The property by which jobs are counted.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GroupBy {
     /// The status of the jobs.
     Status,
     /// The owner of the jobs.
     Owner,
+    /// The verdict on their results; `none` for jobs without one.
+    Verdict,
+    /// The keys of their labels: a job counts for each of its labels.
+    LabelKeys,
+    /// The values of the labels with this key.
+    Label(String),
+}
+
+impl GroupBy {
+    /// The largest number of groups, those with the most jobs: each job may have a label of its own.
+    pub const MOST: i64 = 1000;
+
+    /// Whether every job belongs to exactly one group.
+    pub fn is_partition(&self) -> bool {
+        !matches!(self, GroupBy::LabelKeys | GroupBy::Label(_))
+    }
 }
 
 impl Order {

@@ -28,6 +28,7 @@
 //! | lists of jobs: filters | `filter` |
 //! | lists of jobs: pages and the indexes they use | `list` |
 //! | lists of jobs: labels | `labels` |
+//! | what has changed lately, for those who follow lists | `changes` |
 //! | events of a job | `events` |
 //! | bytes by their hash, and what has them: problems, results, definitions of sweeps, meshes | `content`, `unattached`, `migrations/0017_content.sql` |
 //! | results: their parts, written and read | `results`, `parts`, `encoding`, `snapshot` |
@@ -101,6 +102,9 @@ mod model_files;
 mod old_content;
 mod pages;
 
+// What has changed lately.
+mod changes;
+
 // What belongs to a job: its labels, its events, its problem and result.
 mod events;
 mod labels;
@@ -166,6 +170,7 @@ use self::database::Rebuild;
 
 pub use self::{
     backup::{Backup, back_up},
+    changes::{Changed, Changes, Recent},
     content::{Fingerprint, PIECE_BYTES, PIECES_PER_COMMIT},
     database::Store,
     database::with_advice,
@@ -197,6 +202,11 @@ pub use self::{
 };
 
 impl Store {
+    /// What has changed lately.
+    pub fn changes(&self) -> &Changes {
+        &self.changes
+    }
+
     /// Opens the store in `folder`, which is created if necessary, and brings its tables up to date.
     pub fn open(folder: &Path) -> BoxFuture<'_, Result<Arc<Store>>> {
         Box::pin(Store::open_watched(folder))

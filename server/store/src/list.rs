@@ -8,15 +8,19 @@
 
 use std::sync::Arc;
 
-use base::{caller::Owners, job::Job};
+use base::{
+    caller::Owners,
+    job::{Job, JobId},
+};
 use rusqlite::{Connection, types::Value};
+use uuid::Uuid;
 
 use super::{
     damage::Table,
     database::Store,
     entries::{Entries, bytes_of},
     error::Result,
-    filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy},
+    filter::{Comparison, Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy},
     rows::from_row,
     sql::{Query, Sql},
 };
@@ -147,10 +151,65 @@ impl Store {
             return Ok(vec![]);
         };
         self.read_list(move |store, connection| {
-            let query = counted(&filter, group_by);
-            let groups = connection.rows(query.sql(), query.values(), |row| Ok(row.try_into()?))?;
+            let query = counted(&filter, group_by.as_ref());
+            let mut groups: Vec<(String, i64)> =
+                connection.rows(query.sql(), query.values(), |row| Ok(row.try_into()?))?;
             store.damages.have_all(tables_of(&filter))?;
+            if group_by.is_some_and(|group| !group.is_partition()) {
+                store.damages.have_all(&[Table::Labels])?;
+            }
+            groups.sort();
             Ok(groups)
+        })
+        .await
+    }
+
+    /// Those of the jobs with these keys that a filter lists, in order of arrival.
+    pub async fn jobs_with_keys(
+        self: &Arc<Self>,
+        owners: Owners,
+        filter: &Filter,
+        keys: Vec<i64>,
+    ) -> Result<Vec<Job>> {
+        let Some(filter) = filter.among(&owners) else {
+            return Ok(vec![]);
+        };
+        self.read_list(move |store, connection| {
+            let keys = serde_json::to_string(&keys)?;
+            let mut query = Query::default();
+            query.push("select job.* from job where job.id in (select value from json_each(");
+            query.push_value(keys).push("))");
+            conditions(&mut query, &filter, None, OrderBy::CreatedAt);
+            let window = Window {
+                after: None,
+                last: None,
+                order: Order::OLDEST_FIRST,
+            };
+            let place = Place::of(Lane::All, OrderBy::CreatedAt);
+            bounds(&mut query, &filter, place, window);
+            query.push(" order by job.id");
+            let mut jobs: Vec<Job> = connection.rows(query.sql(), query.values(), from_row)?;
+            store.complete(connection, &mut jobs.iter_mut().collect::<Vec<_>>())?;
+            Ok(jobs)
+        })
+        .await
+    }
+
+    /// The ids of the jobs with these keys, also of those that were deleted lately.
+    pub async fn ids_of(self: &Arc<Self>, owners: Owners, keys: Vec<i64>) -> Result<Vec<JobId>> {
+        const IDS: &str = "with wanted as (select value from json_each(?))
+             select uuid, owner from job where id in wanted
+             union all select uuid, owner from deleted_job where id in wanted";
+        if keys.is_empty() {
+            return Ok(vec![]);
+        }
+        self.read_list(move |_, connection| {
+            let keys = serde_json::to_string(&keys)?;
+            let found: Vec<(String, String)> =
+                connection.rows(IDS, [keys], |row| Ok(row.try_into()?))?;
+            let visible = found.into_iter().filter(|(_, owner)| owners.include(owner));
+            let ids = visible.filter_map(|(uuid, _)| Some(JobId::from(uuid.parse::<Uuid>().ok()?)));
+            Ok(ids.collect())
         })
         .await
     }
@@ -193,7 +252,7 @@ impl Store {
 
 /// The tables whose rows or indexes find the jobs of this filter.
 fn tables_of(filter: &Filter) -> &'static [Table] {
-    if filter.labels.is_empty() {
+    if filter.labels.is_empty() && filter.excluded_labels.is_empty() {
         &[Table::Jobs]
     } else {
         &[Table::Jobs, Table::Labels]
@@ -213,7 +272,12 @@ pub(super) fn paths<'a>(
     order: Order,
 ) -> Vec<Path<'a>> {
     let mut paths = vec![];
-    let mut add = |by, lanes| paths.push(Path { lanes, by });
+    // several lanes are merged by a column, and no column has the time that a job has run
+    let mut add = |by, lanes: Vec<Lane<'a>>| {
+        if order.by != OrderBy::RunS || lanes.len() == 1 {
+            paths.push(Path { lanes, by });
+        }
+    };
     for label in filter.labels.iter().take(MOST_LABEL_PATHS) {
         add(OrderBy::CreatedAt, vec![Lane::Label(label)]);
     }
@@ -223,15 +287,11 @@ pub(super) fn paths<'a>(
             add(OrderBy::CreatedAt, values.iter().map(lane).collect());
         }
     }
-    let other = match order.by {
-        OrderBy::CreatedAt => OrderBy::FinishedAt,
-        OrderBy::FinishedAt => OrderBy::CreatedAt,
-    };
-    if values
-        .iter()
-        .any(|(field, _)| field.column == <&str>::from(other))
-    {
-        paths.push(Path::whole(other));
+    for other in [OrderBy::CreatedAt, OrderBy::FinishedAt] {
+        let bounds = |(field, _): &(&Field, _)| field.column == <&str>::from(other);
+        if other != order.by && values.iter().any(bounds) {
+            paths.push(Path::whole(other));
+        }
     }
     paths.push(Path::whole(order.by));
     paths
@@ -324,9 +384,8 @@ pub(super) fn page(
             Place::of(Lane::All, order.by)
         };
         from(query, lane, path.by, columns);
-        if order.by == OrderBy::FinishedAt {
-            query.push(" and job.finished_at is not null");
-        }
+        let (_, _, has_time) = order.by.sql();
+        query.push(format!(" and {has_time}"));
         if up_to < i64::MAX {
             query.push(" and job.id <= ").push_value(up_to);
         }
@@ -394,10 +453,7 @@ fn from(query: &mut Query, lane: Lane<'_>, by: OrderBy, columns: &str) {
             query.push_value(value.clone());
         }
         Lane::All => {
-            let (index, all) = match by {
-                OrderBy::CreatedAt => ("job_by_created", "true"),
-                OrderBy::FinishedAt => ("job_by_finished", "finished_at is not null"),
-            };
+            let (_, index, all) = by.sql();
             query.push(format!(
                 "select {columns} from job indexed by {index} where {all}"
             ));
@@ -406,12 +462,30 @@ fn from(query: &mut Query, lane: Lane<'_>, by: OrderBy, columns: &str) {
 }
 
 /// A query for the number of jobs in each group.
-pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> Query {
-    let group = group_by.map_or("''", Into::into);
+pub(super) fn counted(filter: &Filter, group_by: Option<&GroupBy>) -> Query {
+    const OF_LABELS: &str = "as kind, count(*) as jobs from job_label
+         cross join job on job.id = job_label.job_id where";
     let mut query = Query::default();
-    query.push(format!(
-        "select {group} as kind, count(*) as jobs from job where true"
-    ));
+    let mut of_jobs = |group: &str| {
+        query.push(format!(
+            "select {group} as kind, count(*) as jobs from job where true"
+        ));
+    };
+    match group_by {
+        None => of_jobs("''"),
+        Some(GroupBy::Status) => of_jobs("status"),
+        Some(GroupBy::Owner) => of_jobs("owner"),
+        Some(GroupBy::Verdict) => of_jobs("coalesce(verdict, 'none')"),
+        Some(GroupBy::LabelKeys) => {
+            query.push(format!("select job_label.key {OF_LABELS} true"));
+        }
+        Some(GroupBy::Label(key)) => {
+            query.push(format!(
+                "select job_label.value {OF_LABELS} job_label.key = "
+            ));
+            query.push_value(key.clone());
+        }
+    }
     conditions(&mut query, filter, None, OrderBy::CreatedAt);
     let window = Window {
         after: None,
@@ -420,7 +494,8 @@ pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> Query {
     };
     let place = Place::of(Lane::All, OrderBy::CreatedAt);
     bounds(&mut query, filter, place, window);
-    query.push(" group by kind order by kind");
+    query.push(" group by kind order by jobs desc, kind limit ");
+    query.push_value(GroupBy::MOST);
     query
 }
 
@@ -431,19 +506,45 @@ fn conditions(query: &mut Query, filter: &Filter, lane: Option<Lane<'_>>, by: Or
         if of_lane || field.column == <&str>::from(by) {
             continue;
         }
-        if field.comparison != "=" {
-            query.push(format!(" and job.{} {} ", field.column, field.comparison));
-            for value in values {
-                query.push_value(value);
-            }
-            continue;
-        }
-        query.push(format!(" and job.{} in (", field.column));
+        /// The columns in which people look for a text.
+        const MENTIONED: &str =
+            "coalesce(job.name, '') || char(10) || coalesce(job.title, '') || char(10) || job.owner
+             || char(10) || 'job_' || job.uuid || char(10) || job.labels";
+        let column = field.column;
+        // a code has no characters that JSON would escape
+        let (before, between, after) = match field.comparison {
+            Comparison::Is => (format!("job.{column} in ("), ", ".to_owned(), ")"),
+            Comparison::From => (format!("job.{column} >= "), String::new(), ""),
+            Comparison::Before => (format!("job.{column} < "), String::new(), ""),
+            Comparison::Contains => (
+                format!("instr(lower(job.{column}), lower("),
+                String::new(),
+                ")) > 0",
+            ),
+            Comparison::Mentions => (
+                format!("instr(lower({MENTIONED}), lower("),
+                String::new(),
+                ")) > 0",
+            ),
+            Comparison::HasCode => (
+                format!("(instr(job.{column}, "),
+                format!(") > 0 or instr(job.{column}, "),
+                ") > 0)",
+            ),
+        };
+        query.push(format!(" and {before}"));
         for (n, value) in values.into_iter().enumerate() {
-            query.push(if n == 0 { "" } else { ", " });
+            query.push(if n == 0 { "" } else { &between });
             query.push_value(value);
         }
-        query.push(")");
+        query.push(after);
+    }
+    for (key, value) in &filter.excluded_labels {
+        query.push(
+            " and not exists (select 1 from job_label where created_at = job.created_at and job_id = job.id and key = ",
+        );
+        query.push_value(key.clone()).push(" and value = ");
+        query.push_value(value.clone()).push(")");
     }
     for label in &filter.labels {
         match lane {
@@ -474,12 +575,8 @@ impl Place {
                 at: "job_label.created_at",
                 id: "job_label.job_id",
             },
-            (_, OrderBy::CreatedAt) => Place {
-                at: "job.created_at",
-                id: "job.id",
-            },
-            (_, OrderBy::FinishedAt) => Place {
-                at: "job.finished_at",
+            (_, by) => Place {
+                at: by.sql().0,
                 id: "job.id",
             },
         }
@@ -501,6 +598,7 @@ fn bounds(query: &mut Query, filter: &Filter, place: Place, window: Window) {
             filter.finished_after.max(filter.created_after),
             filter.finished_before,
         ),
+        OrderBy::RunS => (None, None),
     };
     let (lower, upper) = if order.descending {
         (last, after)
@@ -518,6 +616,11 @@ fn bounds(query: &mut Query, filter: &Filter, place: Place, window: Window) {
         (last, if order.descending { ">=" } else { "<=" }),
     ] {
         if let Some(Cursor { micros, key }) = place {
+            if order.by == OrderBy::RunS {
+                // an index on an expression is searched by a bound on the expression, and not by one on a row of values
+                query.push(format!(" and {at} {}= ", &comparison[..1]));
+                query.push_value(micros);
+            }
             query.push(format!(" and ({at}, {id}) {comparison} ("));
             query
                 .push_value(micros)

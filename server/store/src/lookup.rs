@@ -43,6 +43,21 @@ impl Store {
         .await
     }
 
+    /// The problem of a job as JSON without its title, if it has at most `most` bytes.
+    pub async fn small_problem(self: &Arc<Self>, key: i64, most: usize) -> Result<Option<String>> {
+        self.read(move |_, connection| {
+            let tx = connection.unchecked_transaction()?;
+            let holder = Holder::Job(key);
+            match content::find(&tx, holder, name::PROBLEM)? {
+                Some(found) if found.fingerprint.bytes <= most => {
+                    Ok(Some(content::read_text(&tx, holder, name::PROBLEM)?))
+                }
+                _ => Ok(None),
+            }
+        })
+        .await
+    }
+
     /// Whether the job has ended, so that its events contain `done`; `None` if the job no longer exists.
     pub async fn has_ended(self: &Arc<Self>, key: i64) -> Result<Option<bool>> {
         self.read(move |_, connection| {

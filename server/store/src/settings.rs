@@ -4,7 +4,7 @@ use std::sync::{Arc, atomic::Ordering};
 
 use base::memory::Budget;
 
-use super::{database::Store, error::Result, sql::Sql};
+use super::{changes::Changed, database::Store, error::Result, sql::Sql};
 
 impl Store {
     /// Reads the settings, when the store is opened.
@@ -45,6 +45,7 @@ impl Store {
             tx.run(statement, ())?;
             tx.commit()?;
             writer.store.paused.store(paused, Ordering::Relaxed);
+            writer.store.changes.note([Changed::Queue]);
             Ok(())
         })
         .await

@@ -168,8 +168,8 @@ impl Snapshot {
         Ok(names.await?.unwrap_or_default())
     }
 
-    /// The iterations of the job's current attempt, each as the JSON of its event, in order.
-    pub async fn iterations(&mut self) -> Result<Vec<String>> {
+    /// The iterations of the job's current attempt, each as the number and the JSON of its event, in order.
+    pub async fn iterations(&mut self) -> Result<Vec<(i64, String)>> {
         let (key, attempt) = (self.job.key, self.job.attempt);
         self.read(move |stored| events::iterations(stored.moment.connection()?, key, attempt))
             .await

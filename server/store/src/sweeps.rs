@@ -16,6 +16,7 @@ use uuid::Uuid;
 
 use super::{
     change::Change,
+    changes::Changed,
     checksum::{self, Checksum},
     content::{self, Holder, NewContent, name},
     damage::Table,
@@ -283,8 +284,29 @@ impl Store {
         attempt: i32,
         rows: Vec<(Time, MemberRow)>,
     ) -> Result<Option<i64>> {
-        self.write(move |writer| record_members(writer, job, attempt, &rows))
-            .await
+        self.write(move |writer| {
+            let sweep = record_members(writer, job, attempt, &rows)?;
+            writer.store.changes.note(sweep.map(Changed::Sweep));
+            Ok(sweep)
+        })
+        .await
+    }
+
+    /// The sweeps of these owners with these keys.
+    pub async fn sweeps_with_keys(
+        self: &Arc<Self>,
+        owners: Owners,
+        keys: Vec<i64>,
+    ) -> Result<Vec<Sweep>> {
+        self.read_list(move |_, connection| {
+            let mut sweeps = vec![];
+            for key in keys {
+                let found = find(connection, key)?;
+                sweeps.extend(found.filter(|sweep| owners.include(&sweep.owner)));
+            }
+            Ok(sweeps)
+        })
+        .await
     }
 
     /// Deletes a sweep whose jobs were deleted before; false if the sweep still has jobs, which may run.

@@ -9,6 +9,7 @@
 //! part has a factor, so that the sum is a bound: the factors are calibrated on random problems by
 //! `tests/verification/calibration.rs`, which also says how often the bound holds.
 
+mod assessment;
 mod halved;
 mod increments;
 mod measurement;
@@ -16,6 +17,7 @@ mod signs;
 mod singular;
 mod verdict;
 
+pub use assessment::{Assessment, Finding, FindingCode, assessment};
 pub use halved::{OnOtherMesh, unverified, verified};
 pub use increments::Increments;
 pub use measurement::{add_measurement, without_measurement};

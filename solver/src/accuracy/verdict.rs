@@ -157,7 +157,7 @@ pub(super) fn conclude(
 /// Warnings that make stated errors unreliable, or that say that the result may belong to another problem than was meant;
 /// the best verdict that each permits, and the reason in words.
 #[rustfmt::skip] // a table
-const DOUBTFUL: [(WarningCode, Verdict, &str); 8] = [
+pub(super) const DOUBTFUL: [(WarningCode, Verdict, &str); 8] = [
     (WarningCode::NoContact, Verdict::Fair,
         "A contact never touches its obstacle (`no_contact`): unless that was intended, this is the result of another problem than was meant."),
     (WarningCode::SymmetryMissing, Verdict::Fair,
@@ -365,7 +365,7 @@ fn by_number(unpaired: &Unpaired) -> Finding {
     }
 }
 
-fn percent(part: f64) -> String {
+pub(super) fn percent(part: f64) -> String {
     match 100.0 * part {
         p if p > 100.0 => "more than 100 %".to_owned(),
         p if p < 10.0 => format!("{p:.1} %"),

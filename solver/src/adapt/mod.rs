@@ -126,7 +126,10 @@ pub fn run(
             truncation: truncation.error,
         };
         match next {
-            Ok(finer) => (model, before) = (finer, Some(here)),
+            Ok(finer) => {
+                observer.event(Progress::Mesh(&here.solution));
+                (model, before) = (finer, Some(here));
+            }
             Err(reason) => return Ok(here.ended(problem, goal, sequence, reason, observer)),
         }
     }

@@ -116,6 +116,8 @@ class Validation:
     estimate: Mapping[str, float] | None
     """`dofs`; `memory_bytes`; `run_s`, seconds on one thread. None where the mesh cannot be read."""
     input_hash: str | None
+    description: str | None
+    """The problem in words: what is asked of the solver, as the service has read it. None where it cannot be read."""
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any]) -> Validation:
@@ -125,6 +127,7 @@ class Validation:
             [Warning.from_json(w) for w in document["warnings"]],
             document.get("estimate"),
             document.get("input_hash"),
+            document.get("description"),
         )
 
     def __bool__(self) -> bool:

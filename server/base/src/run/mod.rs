@@ -86,11 +86,14 @@ impl<'a> Run<'a> {
                 Some(Payload::Iteration(row))
             }
             Progress::Warning(warning) => Some(Payload::Warning(warning.clone())),
-            Progress::Tentative(_) | Progress::Step(_) | Progress::OutOfMemory { .. } => None,
+            Progress::Tentative(_)
+            | Progress::Step(_)
+            | Progress::Mesh(_)
+            | Progress::OutOfMemory { .. } => None,
         }
     }
 
-    /// The document of the solution at the end of a load step that is not the last, without fields. Making it costs as
+    /// The document of the solution at the end of a load step or on a mesh that is not the last, without fields. Making it costs as
     /// much as all its data, so it is not made for every step.
     pub fn document_so_far(&self, solution: &Solution) -> Result<Document, SolveError> {
         let times = self.watch.borrow_mut().times();
@@ -153,7 +156,10 @@ impl Observer for Timed<'_> {
             Progress::Refinement { number, .. } => watch.on_mesh(*number),
             Progress::Tentative(row) => watch.done_tentatively(row),
             Progress::Iteration(row) => watch.done(row),
-            Progress::Warning(_) | Progress::Step(_) | Progress::OutOfMemory { .. } => {}
+            Progress::Warning(_)
+            | Progress::Step(_)
+            | Progress::Mesh(_)
+            | Progress::OutOfMemory { .. } => {}
         }
         drop(watch);
         if let Progress::Tentative(row) | Progress::Iteration(row) = &progress {

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use serde_json::value::RawValue;
 use service::{
     formats::{self, Format},
-    verbs::job_table::{COLUMNS, Columns},
+    verbs::job_table::{COLUMNS, Columns, leaves_of},
 };
 
 use super::{
@@ -31,7 +32,8 @@ pub(crate) struct Arguments {
     selected: Selected,
 
     /// The columns, separated by commas: those of a job, label.KEY, and the numbers of its result, as normal_force of a
-    /// job with one contact, normal_force.BOUNDARY, normal_force_error (the ±) [default: the most important ones]
+    /// job with one contact, normal_force.BOUNDARY, normal_force_error (the ±), and values of its problem, as
+    /// /contacts/0/friction/coefficient [default: the most important ones]
     #[arg(long, value_name = "COLUMNS", value_parser = columns)]
     columns: Option<Columns>,
 
@@ -39,6 +41,10 @@ pub(crate) struct Arguments {
     /// not a solution
     #[arg(long)]
     partial: bool,
+
+    /// Have also the values in which the problems of the jobs differ, each as a column named by its JSON Pointer
+    #[arg(long)]
+    differing: bool,
 
     /// Write the table to this file, in the format of its extension: .csv, .jsonl, .arrow, .npz or .json; - writes JSON
     /// to standard output. Without a file the table is printed as CSV
@@ -67,8 +73,19 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     }
     let jobs = jobs.iter().map(listing::job);
     let jobs = jobs.collect::<anyhow::Result<Vec<_>>>()?;
-    let columns = arguments.columns.unwrap_or_default();
-    let table = columns.of(&jobs, arguments.partial);
+    let mut columns = arguments.columns.unwrap_or_default();
+    let mut problems = vec![];
+    if arguments.differing || columns.has_parameters() {
+        for job in &jobs {
+            let path = format!("/v1/jobs/{}/problem", job.id);
+            let problem: Box<RawValue> = service.get(&path).await?;
+            problems.push(leaves_of(problem.get()));
+        }
+    }
+    if arguments.differing {
+        columns = columns.with_differing(&problems);
+    }
+    let table = columns.of(&jobs, arguments.partial, &problems);
     let bytes = match format {
         Format::Json => {
             let lines = table.jsonl().map_err(anyhow::Error::msg)?;

@@ -80,6 +80,10 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             let severity: &str = code.map_or("warning", |code| code.severity().into());
             (severity, format!("{pointer}: {}", text("message")))
         });
+        let described = document["description"].as_str().unwrap_or_default();
+        if !described.is_empty() {
+            output::print(&format!("{described}\n"))?;
+        }
         let lines = [
             ("valid", "yes".to_owned()),
             ("unknowns", shown(&|of| of["dofs"].to_string())),

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use base::{
     caller::Scope,
-    event::{Event, Payload, TimedIteration},
+    event::{Event, HistoryRow, Payload, TimedIteration},
     id::{Id, Kind},
     job::{Reason, Waiting},
     run::Summary,
@@ -139,6 +139,15 @@ impl From<TimedIteration> for pb::Iteration {
         pb::Iteration {
             wall_s,
             ..row.into()
+        }
+    }
+}
+
+impl From<HistoryRow> for pb::Iteration {
+    fn from(HistoryRow { seq, timed }: HistoryRow) -> Self {
+        pb::Iteration {
+            seq,
+            ..timed.into()
         }
     }
 }

@@ -8,9 +8,10 @@ use base::{bodies, job, mesh, run::Summary, sweep, token};
 use files::MeshFormat;
 use service::{
     config::Isolation,
-    verbs::{bulk, info, jobs, lists, problems, queue, results, tokens},
+    queue::LoadPoint,
+    verbs::{bulk, examples, info, jobs, lists, problems, queue, results, tokens},
 };
-use solver::{element::Element, problem, solution};
+use solver::{accuracy, element::Element, problem, solution};
 
 use super::{FromMessage, IntoMessage, Reader};
 use crate::pb;

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use base::{
-    job::{Cache, Status, SweepId},
+    job::{Cache, JobId, Status, SweepId},
     time::Time,
-    values::Values,
+    values::{Values, Words},
 };
 use files::sweep::{Axis, Mode, Spaced, Variation};
 use prost_types::Timestamp;
@@ -14,11 +14,15 @@ use service::{
     error::ApiError,
     verbs::{
         envelope::{Envelope, JobRequest},
-        filters,
+        filters, jobs,
         sweeps::{self, SweepRequest},
     },
 };
-use solver::{error::Reason, problem::Problem, solution::Verdict};
+use solver::{
+    error::Reason,
+    problem::Problem,
+    solution::{Verdict, WarningCode},
+};
 use store::{Edit, Filter, job_filters};
 
 use super::{FromMessage, Reader, read};
@@ -221,6 +225,41 @@ impl Criterion<Option<SweepId>> for Option<String> {
     }
 }
 
+impl Criterion<Option<bool>> for Option<bool> {
+    fn read(self, _name: &'static str) -> Result<Option<bool>, ApiError> {
+        Ok(self)
+    }
+}
+
+impl Criterion<Option<JobId>> for Option<String> {
+    fn read(self, name: &'static str) -> Result<Option<JobId>, ApiError> {
+        let job = |id: String| {
+            JobId::parse(&id).ok_or_else(|| invalid_field(name, id, jobs::ID.values.expected()))
+        };
+        self.map(job).transpose()
+    }
+}
+
+impl Criterion<Vec<JobId>> for Vec<String> {
+    fn read(self, name: &'static str) -> Result<Vec<JobId>, ApiError> {
+        let job = |id: String| {
+            JobId::parse(&id).ok_or_else(|| invalid_field(name, id, jobs::ID.values.expected()))
+        };
+        self.into_iter().map(job).collect()
+    }
+}
+
+impl Criterion<Vec<WarningCode>> for Vec<String> {
+    fn read(self, name: &'static str) -> Result<Vec<WarningCode>, ApiError> {
+        let all = Words::<WarningCode>::all();
+        let code = |word: String| {
+            let code = all.read(&word);
+            code.ok_or_else(|| invalid_field(name, word, "the code of a warning"))
+        };
+        self.into_iter().map(code).collect()
+    }
+}
+
 impl Criterion<Option<Time>> for Option<Timestamp> {
     fn read(self, name: &'static str) -> Result<Option<Time>, ApiError> {
         time(name, self)
@@ -231,9 +270,10 @@ macro_rules! reader {
     ($($field:ident: $type:ty, $name:ident, $column:literal $comparison:literal, $index:expr, $meaning:literal;)*) => {
         /// Reads a filter of jobs; without a message every job matches.
         pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
-            let pb::JobFilter { labels, $($name,)* } = message.unwrap_or_default();
+            let pb::JobFilter { labels, excluded_labels, $($name,)* } = message.unwrap_or_default();
             filters::checked(Filter {
                 labels: labels.into_iter().collect(),
+                excluded_labels: excluded_labels.into_iter().collect(),
                 $($field: Criterion::<$type>::read($name, stringify!($name))?,)*
             })
         }

@@ -7,7 +7,8 @@ use tokio::time::timeout;
 use tonic::Status;
 
 use crate::pb::{
-    Event, KeepAliveEvent, SweepEvent, event::Payload as OfJob, sweep_event::Payload as OfSweep,
+    Event, JobsEvent, KeepAliveEvent, SweepEvent, event::Payload as OfJob,
+    jobs_event::Payload as OfJobs, sweep_event::Payload as OfSweep,
 };
 
 /// The longest silence of a stream: many proxies cut a connection after a minute.
@@ -16,16 +17,33 @@ const PAUSE: Duration = Duration::from_secs(15);
 /// A stream of messages to a client.
 pub(super) type Messages<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
-/// A message with the number by which a client resumes its stream.
+/// A message with the place by which a client resumes its stream: a number, or the id of an event.
 pub(super) trait Numbered: Sized {
-    fn seq(&self) -> i64;
+    type Place: Clone + Send;
 
-    /// The message that only keeps the stream open, with the number of the message before.
-    fn keep_alive(seq: i64) -> Self;
+    fn place(&self) -> Self::Place;
+
+    /// The message that only keeps the stream open, with the place of the message before.
+    fn keep_alive(place: Self::Place) -> Self;
+}
+
+impl Numbered for JobsEvent {
+    type Place = String;
+
+    fn place(&self) -> String {
+        self.id.clone()
+    }
+
+    fn keep_alive(id: String) -> Self {
+        let payload = Some(OfJobs::KeepAlive(KeepAliveEvent {}));
+        JobsEvent { id, payload }
+    }
 }
 
 impl Numbered for Event {
-    fn seq(&self) -> i64 {
+    type Place = i64;
+
+    fn place(&self) -> i64 {
         self.seq
     }
 
@@ -39,7 +57,9 @@ impl Numbered for Event {
 }
 
 impl Numbered for SweepEvent {
-    fn seq(&self) -> i64 {
+    type Place = i64;
+
+    fn place(&self) -> i64 {
         self.seq
     }
 
@@ -52,19 +72,19 @@ impl Numbered for SweepEvent {
     }
 }
 
-/// The stream with a message after each pause. `after`: the number after which the stream begins.
-pub(super) fn kept_alive<T: Numbered + Send + 'static>(
-    after: i64,
+/// The stream with a message after each pause. `after`: the place after which the stream begins.
+pub(super) fn kept_alive<T: Numbered<Place: 'static> + Send + 'static>(
+    after: T::Place,
     messages: impl Stream<Item = Result<T, Status>> + Send + 'static,
 ) -> Messages<T> {
     let begin = (messages.boxed(), after);
-    unfold(begin, |(mut messages, seq)| async move {
+    unfold(begin, |(mut messages, place)| async move {
         let next = match timeout(PAUSE, messages.next()).await {
             Ok(next) => next?,
-            Err(_) => Ok(T::keep_alive(seq)),
+            Err(_) => Ok(T::keep_alive(place.clone())),
         };
-        let seq = next.as_ref().map_or(seq, T::seq);
-        Some((next, (messages, seq)))
+        let place = next.as_ref().map_or(place, T::place);
+        Some((next, (messages, place)))
     })
     .boxed()
 }

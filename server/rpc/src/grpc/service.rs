@@ -1,12 +1,13 @@
 //! The rpcs: each is translated to an operation of the service.
 
-use std::{pin::Pin, sync::Arc};
+use std::{collections::BTreeSet, pin::Pin, sync::Arc};
 
 use base::{
     caller::Caller,
     event::StoredEvent,
     job::{Job, ResultAvailable},
 };
+use files::plot::ViewField;
 use futures_util::{Stream, StreamExt};
 use service::{
     error::ApiError,
@@ -16,11 +17,11 @@ use service::{
         Service,
         bulk::{self, BulkResult},
         envelope::JobRequest,
-        fields,
+        examples, fields,
         history::{self, MAX_POINTS},
         info,
         jobs::{self, ID, LabelChanges},
-        lists::{self, GROUP_BY, ORDER_BY},
+        lists::{self, FIELDS, GROUP_BY, ORDER_BY},
         meshes::{self, HASH},
         page::Paging,
         problems, profiles, queue,
@@ -29,7 +30,9 @@ use service::{
         submit::{self, Submitted},
         sweeps,
         tokens::{self, TOKEN, TokenRequest, TokensChanged},
+        views,
         watch::{self, AFTER_SEQ, Until, WAIT},
+        watch_list::{self, ListEvent, ListPayload},
     },
     violations,
 };
@@ -151,14 +154,19 @@ impl JobService for Grpc {
             page_size,
             page_token,
             order_by,
+            fields,
         } = request;
         let order = read_if_set(&ORDER_BY, &order_by)?;
+        let fields = read_if_set(&FIELDS, &fields.join(","))?;
         let filter = filter(jobs)?;
         let paging = paging(page_size, page_token)?;
         let list = async |paging: &Paging| {
             let page = lists::list(&self.service, &caller, &filter, order, paging).await?;
-            let jobs: Vec<pb::Job> = page.items.into_iter().map(Into::into).collect();
-            Ok::<_, ApiError>((jobs, page.next))
+            let jobs = page.items.into_iter().map(|job| match &fields {
+                Some(fields) => job.with_fields(fields).into(),
+                None => job.into(),
+            });
+            Ok::<_, ApiError>((jobs.collect::<Vec<pb::Job>>(), page.next))
         };
         let (mut jobs, mut next) = list(&paging).await?;
         let fitting = messages_that_fit(&jobs);
@@ -211,6 +219,121 @@ impl JobService for Grpc {
         Ok(Response::new(messages(after, events)))
     }
 
+    type WatchJobsStream = Messages<pb::JobsEvent>;
+
+    async fn watch_jobs(
+        &self,
+        request: Request<pb::WatchJobsRequest>,
+    ) -> Reply<Self::WatchJobsStream> {
+        let (caller, request) = caller_and_message(request)?;
+        let fields = read_if_set(&FIELDS, &request.fields.join(","))?;
+        let jobs = filter(request.filter)?;
+        let after = Some(request.after.clone()).filter(|id| !id.is_empty());
+        let events = watch_list::watch(&self.service, &caller, jobs, after)?;
+        let events = events.map(move |event| Ok(jobs_event(event?, fields.as_ref())));
+        Ok(Response::new(kept_alive(request.after, events)))
+    }
+
+    async fn get_job_description(
+        &self,
+        request: Request<pb::GetJobDescriptionRequest>,
+    ) -> Reply<pb::JobDescription> {
+        let (caller, request) = caller_and_message(request)?;
+        let told = views::description(&self.service, &caller, ID.read(&request.id)?);
+        let description = told.await?;
+        Ok(Response::new(pb::JobDescription { description }))
+    }
+
+    type StreamViewStream = Self::StreamResultStream;
+
+    async fn stream_view(
+        &self,
+        request: Request<pb::StreamViewRequest>,
+    ) -> Reply<Self::StreamViewStream> {
+        use pb::stream_view_request::Of;
+        let (caller, request) = caller_and_message(request)?;
+        let (service, partial) = (&self.service, request.partial);
+        let field = match pb::ViewField::try_from(request.field) {
+            Ok(pb::ViewField::Unspecified) => None,
+            Ok(field) => Some(view_field(field)?),
+            Err(_) => {
+                let expected = "a value of the enum ViewField";
+                return Err(invalid_field("field", request.field, expected).into());
+            }
+        };
+        let bytes = match (request.of, field) {
+            (Some(Of::Job(id)), None) => {
+                views::of_job(service, &caller, ID.read(&id)?, partial)
+                    .await?
+                    .content
+            }
+            (Some(Of::Job(id)), Some(field)) => {
+                let id = ID.read(&id)?;
+                views::field_of_job(service, &caller, id, field, partial)
+                    .await?
+                    .content
+            }
+            (Some(Of::Problem(message)), None) => {
+                let problem = || {
+                    read(message).map_err(|found| violations::prefixed(violations::PROBLEM, found))
+                };
+                let problem = service.work(problem).await?;
+                views::of_problem(service, &caller, problem).await?
+            }
+            (Some(Of::Mesh(hash)), None) => {
+                views::of_mesh(service, &caller, &HASH.read(&hash)?).await?
+            }
+            (Some(_), Some(_)) => {
+                return Err(
+                    invalid_field("field", "a field", "a job, whose result has fields").into(),
+                );
+            }
+            (None, _) => {
+                return Err(invalid_field("of", "none", "a job, a problem or a mesh").into());
+            }
+        };
+        let (total_bytes, sha256) = (bytes.len() as u64, Sha256::digest(&bytes).to_vec());
+        let chunks = async_stream::stream! {
+            for (number, piece) in (0..).zip(bytes.chunks(PIECE_BYTES)) {
+                yield Ok(pb::StreamResultResponse {
+                    data: piece.to_vec(),
+                    offset: number * PIECE_BYTES as u64,
+                    total_bytes,
+                    sha256: sha256.clone(),
+                });
+            }
+        };
+        Ok(Response::new(chunks.boxed()))
+    }
+
+    async fn convert_deck(
+        &self,
+        request: Request<pb::ConvertDeckRequest>,
+    ) -> Reply<pb::ConvertDeckResponse> {
+        let (caller, request) = caller_and_message(request)?;
+        let found = problems::convert(&self.service, &caller, request.deck).await?;
+        one_message(found.into(), "POST /v1/problems/convert")
+    }
+
+    async fn list_examples(
+        &self,
+        request: Request<pb::ListExamplesRequest>,
+    ) -> Reply<pb::ListExamplesResponse> {
+        let (caller, _) = caller_and_message(request)?;
+        Ok(Response::new(
+            examples::examples(&self.service, &caller)?.into(),
+        ))
+    }
+
+    async fn list_waiting(
+        &self,
+        request: Request<pb::ListWaitingRequest>,
+    ) -> Reply<pb::ListWaitingResponse> {
+        let (caller, _) = caller_and_message(request)?;
+        let waiting = queue::waiting(&self.service, &caller).await?;
+        Ok(Response::new(waiting.into()))
+    }
+
     async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {
         let (caller, request) = caller_and_message(request)?;
         let result = results::result(&self.service, &caller, ID.read(&request.id)?).await?;
@@ -239,7 +362,7 @@ impl JobService for Grpc {
         let (id, most) = (ID.read(&request.id)?, max_points.transpose()?);
         let found = history::history(&self.service, &caller, id, most, request.partial).await?;
         let (available, mut rows) = (found.available, found.content);
-        rows.retain(|timed| timed.row.k > request.after);
+        rows.retain(|row| row.timed.row.k > request.after);
         let more = rows.len() > MAX_ROWS;
         rows.truncate(MAX_ROWS);
         let answer = pb::ListIterationsResponse {
@@ -646,6 +769,34 @@ impl JobService for Grpc {
         let response = Response::new(submitted.accepted.into());
         Ok(noting_replay(response, submitted.replayed))
     }
+}
+
+/// The message of an event of a list.
+fn jobs_event(event: ListEvent, fields: Option<&BTreeSet<&'static str>>) -> pb::JobsEvent {
+    use pb::jobs_event::Payload as Out;
+    let payload = match event.payload {
+        ListPayload::Reset {} => Out::Reset(pb::ResetEvent {}),
+        ListPayload::Job { job } => Out::Job(match fields {
+            Some(fields) => job.with_fields(fields).into(),
+            None => (*job).into(),
+        }),
+        ListPayload::Removed { id } => Out::Removed(id.to_string()),
+        ListPayload::Sweep { sweep } => Out::Sweep((*sweep).into()),
+        ListPayload::Counts { counts } => Out::Counts(counts.into()),
+        ListPayload::Queue { queue } => Out::Queue(queue.into()),
+    };
+    pb::JobsEvent {
+        id: event.id.unwrap_or_default(),
+        payload: Some(payload),
+    }
+}
+
+/// The field of a view that a value of the enum stands for.
+fn view_field(field: pb::ViewField) -> Result<ViewField, ApiError> {
+    let name = field.as_str_name().trim_start_matches("VIEW_FIELD_");
+    let name = name.to_ascii_lowercase();
+    let known = name.parse();
+    known.map_err(|_| invalid_field("field", name, "a value of the enum ViewField"))
 }
 
 type EventStream = Messages<pb::Event>;

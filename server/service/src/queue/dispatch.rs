@@ -169,6 +169,9 @@ impl Queue {
         let mut requeuing = RepeatedError::new("lost jobs could not be requeued");
         let mut forgetting = RepeatedError::new("ids of deleted jobs could not be removed");
         loop {
+            let seen = self.state();
+            self.last_hour
+                .see(Time::now(), seen.queued as u64, seen.running as u64);
             match expiring.note(self.store.expire_queued(Time::now()).await) {
                 Some(changed) if !changed.is_empty() => {
                     self.announce(&changed);

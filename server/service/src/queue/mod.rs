@@ -36,12 +36,14 @@
 //! | watchers: woken, and served from one reading of the store | `watchers`, `feed` |
 //! | metrics and spans of an attempt | `phases` |
 //! | failed writes, repeated | `backoff` |
+//! | the load of the last hour | `load` |
 //! | data that the tasks share; whether a second thread is free | `state` |
 //! | a failure at every stage of a job | `tests/failpoints.rs` |
 
 // In order of use: no file uses one below it.
 mod backoff;
 mod feed;
+mod load;
 mod running;
 mod watchers;
 
@@ -66,6 +68,7 @@ mod tests;
 
 pub use self::{
     feed::News,
+    load::LoadPoint,
     process::{Processes, run_worker_process},
     state::{Queue, Solver, State},
     watchers::Subscription,

@@ -214,9 +214,11 @@ fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) 
         }
         Payload::Iteration(timed) => {
             let row = &timed.row;
+            let residual = row.residual.max(row.friction_residual);
+            progress.add_residual(row.k, residual);
             *progress = Progress {
                 iteration: row.k,
-                residual: Some(row.residual.max(row.friction_residual)),
+                residual: Some(residual),
                 tolerance: Some(row.tolerance),
                 contact_changes: Some(row.contact.entered + row.contact.left),
                 rate: row.contraction,

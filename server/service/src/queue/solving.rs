@@ -244,6 +244,11 @@ impl Observer for Metered<'_> {
                     self.supervisor.partial(parts);
                 }
             }
+            Progress::Mesh(solution) => {
+                if let Some(parts) = self.partials.of_mesh(run, solution) {
+                    self.supervisor.partial(parts);
+                }
+            }
             progress => {
                 if let Some(payload) = run.payload(progress) {
                     self.supervisor.event(payload);
@@ -346,6 +351,8 @@ pub(super) struct Partials {
     pause: Duration,
     /// The largest part of the time that storing partial results may take, as 1/`part`.
     part: u32,
+    /// When the job began.
+    begun: Instant,
     /// The time when the next partial result may be stored; `None` once a partial result was too large.
     next: Option<Instant>,
 }
@@ -356,6 +363,7 @@ impl Partials {
         Partials {
             pause: Duration::from_secs(1),
             part: 10,
+            begun: Instant::now(),
             next: Some(Instant::now()),
         }
     }
@@ -367,6 +375,17 @@ impl Partials {
             pause: Duration::ZERO,
             part: 0,
             ..Partials::paced()
+        }
+    }
+
+    /// The partial result on a mesh that is not the last, if it is time to store one: not in the first second, in which most
+    /// problems come to their last mesh.
+    fn of_mesh(&mut self, run: &Run<'_>, solution: &Solution) -> Option<Parts> {
+        let is_late = self.begun.elapsed() >= self.pause;
+        if is_late {
+            self.next(run, solution)
+        } else {
+            None
         }
     }
 

@@ -12,6 +12,7 @@ use tokio::sync::{Notify, OwnedSemaphorePermit, RwLock, Semaphore, SemaphorePerm
 use tokio_util::sync::CancellationToken;
 
 use super::{
+    load::{LastHour, LoadPoint},
     process::Processes,
     running::Running,
     watchers::{Subscription, Watchers},
@@ -54,6 +55,8 @@ pub struct Queue {
     /// The traces of the requests that submitted the jobs, by the jobs' keys, for spans. They are not stored: after a
     /// restart a job begins a trace of its own.
     origins: Mutex<BTreeMap<i64, Trace>>,
+    /// The load of the last hour.
+    pub(super) last_hour: LastHour,
     /// The token that is canceled when the service is about to stop.
     pub(super) stopping: CancellationToken,
 }
@@ -102,6 +105,7 @@ impl Queue {
             running: Mutex::default(),
             claiming: RwLock::default(),
             origins: Mutex::default(),
+            last_hour: LastHour::default(),
             stopping: CancellationToken::new(),
         })
     }
@@ -151,6 +155,11 @@ impl Queue {
             workers: self.workers,
             idle: self.slots.available_permits(),
         }
+    }
+
+    /// The load of the last hour, a point for each minute that the service ran.
+    pub fn last_hour(&self) -> Vec<LoadPoint> {
+        self.last_hour.points()
     }
 
     /// Pauses the queue: no more jobs are started until it is resumed, also after a restart; running jobs continue.

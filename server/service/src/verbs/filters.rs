@@ -14,7 +14,7 @@ use crate::{
 /// The filter by label; each key has its parameter `label.{key}`.
 pub const LABEL: Parameter<Text> = Parameter {
     name: "label.{key}",
-    meaning: "label.KEY=VALUE: only jobs with this label; several may be given",
+    meaning: "label.KEY=VALUE: only jobs with this label; label.KEY!=VALUE: only jobs without it; several may be given",
     values: Text,
 };
 
@@ -64,11 +64,19 @@ fn labels() -> Description {
 /// Checks a filter against its limits; removes duplicate statuses and labels.
 pub fn checked(filter: Filter) -> Result<Filter, ApiError> {
     let filter = filter.tidied();
-    if filter.labels.len() > Filter::MOST_LABELS {
+    let labels = filter.labels.len() + filter.excluded_labels.len();
+    if labels > Filter::MOST_LABELS {
         return Err(ApiError::BadParameter {
             name: "labels",
-            got: format!("{} labels", filter.labels.len()),
+            got: format!("{labels} labels"),
             expected: format!("at most {} labels", Filter::MOST_LABELS),
+        });
+    }
+    if filter.ids.len() > Filter::MOST_IDS {
+        return Err(ApiError::BadParameter {
+            name: "id",
+            got: format!("{} ids", filter.ids.len()),
+            expected: format!("at most {} ids", Filter::MOST_IDS),
         });
     }
     Ok(filter)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use base::{
     caller::Caller,
-    event::{Payload, TimedIteration},
+    event::{HistoryRow, Payload, TimedIteration},
     job::{JobId, ResultAvailable},
     values::Integers,
 };
@@ -33,7 +33,7 @@ pub fn history<'a>(
     id: JobId,
     max_points: Option<i64>,
     partial: bool,
-) -> BoxFuture<'a, Result<Found<Vec<TimedIteration>>, ApiError>> {
+) -> BoxFuture<'a, Result<Found<Vec<HistoryRow>>, ApiError>> {
     Box::pin(async move {
         let (service, caller) = (service.clone(), caller.clone());
         // what is read goes on if the client does not wait, and its memory counts until then
@@ -48,7 +48,7 @@ async fn read_history(
     id: JobId,
     max_points: Option<i64>,
     partial: bool,
-) -> Result<Found<Vec<TimedIteration>>, ApiError> {
+) -> Result<Found<Vec<HistoryRow>>, ApiError> {
     let share = room_for(service, caller, id, &["history"]).await?;
     let load = async {
         let mut found = jobs::snapshot(service, caller, id).await?;
@@ -88,8 +88,8 @@ async fn read_history(
 pub(super) enum StoredHistory {
     /// A history that is stored with the result.
     Whole(Vec<u8>),
-    /// Rows that are stored one by one, as events.
-    Events(Vec<String>),
+    /// Rows that are stored one by one, as events, each with its number.
+    Events(Vec<(i64, String)>),
 }
 
 impl StoredHistory {
@@ -105,10 +105,18 @@ impl StoredHistory {
         Ok(StoredHistory::Events(found.iterations().await?))
     }
 
-    pub(super) fn read(self) -> Result<Vec<TimedIteration>, ApiError> {
+    pub(super) fn read(self) -> Result<Vec<HistoryRow>, ApiError> {
         let rows = match self {
-            StoredHistory::Whole(bytes) => serde_json::from_slice(&bytes),
-            StoredHistory::Events(lines) => lines.iter().map(|line| row(line)).collect(),
+            StoredHistory::Whole(bytes) => serde_json::from_slice(&bytes)
+                .map(|rows: Vec<TimedIteration>| rows.into_iter().map(Into::into).collect()),
+            StoredHistory::Events(lines) => {
+                let numbered = |(seq, line): &(i64, String)| {
+                    let timed = row(line)?;
+                    let seq = Some(*seq);
+                    Ok(HistoryRow { seq, timed })
+                };
+                lines.iter().map(numbered).collect()
+            }
         };
         rows.map_err(ApiError::internal)
     }
@@ -125,7 +133,7 @@ fn row(line: &str) -> serde_json::Result<TimedIteration> {
 }
 
 /// Keeps at most `most` rows (`most` is 2 or more), evenly distributed, including the first and the last.
-fn downsample(rows: &mut Vec<TimedIteration>, most: usize) {
+fn downsample<T>(rows: &mut Vec<T>, most: usize) {
     let count = rows.len();
     if count <= most || most < 2 {
         return;

@@ -4,7 +4,7 @@
 use base::{
     caller::{Caller, LOCAL, Peer, is_owner},
     time::Time,
-    token::Presented,
+    token::{Presented, Token},
 };
 use store::Store;
 
@@ -17,6 +17,8 @@ pub struct Credentials {
     pub token: Option<Result<Presented, ()>>,
     /// The users named by the header of a proxy; more than one is an error.
     pub users: Vec<String>,
+    /// The tokens in the cookies of a browser, which may have several of other services at the same host.
+    pub cookies: Vec<Presented>,
 }
 
 /// A caller, and the kind of identification.
@@ -54,6 +56,14 @@ impl By {
     }
 }
 
+/// The first valid token in the cookies of a browser, unless the request has a token of its own.
+fn of_cookies<'a>(store: &Store, credentials: &'a Credentials) -> Option<(&'a Presented, Token)> {
+    let now = Time::of_the_machine();
+    let cookies = credentials.cookies.iter();
+    let mut valid = cookies.filter_map(|sent| Some((sent, store.find_token(sent, now)?)));
+    valid.next().filter(|_| credentials.token.is_none())
+}
+
 /// Identifies the caller of a request from `peer`; the error says why there is none.
 pub fn identify(
     store: &Store,
@@ -65,6 +75,13 @@ pub fn identify(
     if let Some(Ok(presented)) = &credentials.token {
         let token = store.find_token(presented, Time::of_the_machine());
         let token = token.ok_or(ApiError::Unauthenticated(UNKNOWN))?;
+        return Ok(Identified {
+            caller: token.caller(),
+            by: By::Token(presented.clone()),
+        });
+    }
+    // one that is not valid is as none: it may be that of another service at this host
+    if let Some((presented, token)) = of_cookies(store, credentials) {
         return Ok(Identified {
             caller: token.caller(),
             by: By::Token(presented.clone()),

@@ -18,7 +18,12 @@ use super::{
     submit::MAX_BATCH,
     watch::MAX_WAIT_S,
 };
-use crate::{config::Isolation, error::ApiError, formats::Format, rates::Rates};
+use crate::{
+    config::{Isolation, RetentionLimits},
+    error::ApiError,
+    formats::Format,
+    rates::Rates,
+};
 
 /// Version and limits of a service.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -39,6 +44,8 @@ pub struct Info {
     pub body_cache: BodyCache,
     /// The use of the disk.
     pub disk: Disk,
+    /// How long jobs that have ended are kept, and how many.
+    pub retention: Retention,
     /// The formats of rows (profiles, history), the default first.
     pub table_formats: Vec<String>,
     /// The formats of fields, the default first.
@@ -55,6 +62,38 @@ pub struct Disk {
     pub unused_bytes: u64,
     /// The bytes that are free in the file system.
     pub free_bytes: u64,
+}
+
+/// How long jobs that have ended are kept, and how many; pinned jobs do not count, and are kept. `null`: no limit.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct Retention {
+    /// The days that a job is kept after its end.
+    pub days: Option<f64>,
+    /// The days that displacements and stresses are kept; profiles, history and summary remain as long as their job.
+    pub fields_days: Option<f64>,
+    /// The bytes of all jobs that have ended; beyond that the oldest of the owners who store most are removed.
+    pub bytes: Option<u64>,
+    /// The bytes of the jobs of one owner that have ended.
+    pub bytes_per_owner: Option<u64>,
+    /// The number of jobs that have ended.
+    pub jobs: Option<u64>,
+    /// The number of jobs of one owner that have ended.
+    pub jobs_per_owner: Option<u64>,
+}
+
+impl Retention {
+    fn of(limits: &RetentionLimits) -> Retention {
+        let days = |days: f64| Some(days).filter(|days| *days > 0.0);
+        let number = |number: u64| Some(number).filter(|number| *number > 0);
+        Retention {
+            days: days(limits.retain_days),
+            fields_days: days(limits.retain_fields_days),
+            bytes: number(limits.retain_bytes),
+            bytes_per_owner: number(limits.retain_bytes_per_owner),
+            jobs: number(limits.retain_jobs),
+            jobs_per_owner: number(limits.retain_jobs_per_owner),
+        }
+    }
 }
 
 /// Limits of the service.
@@ -248,6 +287,7 @@ pub fn info<'a>(
                 unused_bytes: space.unused,
                 free_bytes: space.free,
             },
+            retention: Retention::of(&service.config.retention),
             table_formats: names(Format::OF_TABLES),
             field_formats: names(Format::OF_FIELDS),
         })

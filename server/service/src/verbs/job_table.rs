@@ -1,15 +1,19 @@
 //! The operation that returns many jobs, with the numbers of their results, as one table.
 
-use std::{borrow::Cow, collections::BTreeSet, sync::Arc};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use base::{
     caller::Caller,
     job::Job,
-    values::{Integers, Values},
+    values::{Integers, Values, Words},
 };
 use files::table::{self, Table};
 use futures_util::future::BoxFuture;
-use serde_json::json;
+use serde_json::{Value, json};
 use solver::solution::{ErrorMethod, EstimatedQuantity, QuantityName};
 use store::{Filter, Order};
 
@@ -33,8 +37,15 @@ pub const NEXT_PAGE_TOKEN: &str = "next-page-token";
 /// The columns of the table.
 pub const COLUMNS: Parameter<ColumnNames> = Parameter {
     name: "columns",
-    meaning: "Columns of the table, separated by commas and in this order: those of a job, label.KEY for the value of a label, normal_force for a number of the result of a job with one contact, normal_force.BOUNDARY for that of the contact of this name, and likewise normal_force_error for its ±; default: id, name, status, reason, verdict, created_at, run_s, contacts, all numbers with their errors, severity (of the most severe warning), warnings, labels. A peak that grows on finer meshes has no number",
+    meaning: "Columns of the table, separated by commas and in this order: those of a job, label.KEY for the value of a label, normal_force for a number of the result of a job with one contact, normal_force.BOUNDARY for that of the contact of this name, likewise normal_force_error for its ±, and /contacts/0/friction/coefficient for a value of the problem, by its JSON Pointer; default: id, name, status, reason, verdict, created_at, run_s, contacts, all numbers with their errors, severity (of the most severe warning), warnings, labels. A peak that grows on finer meshes has no number",
     values: ColumnNames,
+};
+
+/// Whether the table also has the values in which the problems of its jobs differ.
+pub const DIFFERING: Parameter<Words<bool>> = Parameter {
+    name: "differing",
+    meaning: "Whether the table also has the values in which the problems of its rows differ, each as a column named by its JSON Pointer; at most 50; default false",
+    values: Words(|| vec![("false", false), ("true", true)]),
 };
 
 /// The largest number of columns of a table.
@@ -57,7 +68,8 @@ impl Values for ColumnNames {
         let names: Vec<&str> = fields.chain(numbers).collect();
         format!(
             "at most {MOST_COLUMNS} of these, each once and separated by commas: {}, label.KEY; also the errors of numbers, as normal_force{ERROR}, \
-             and numbers of the contact of a boundary, as normal_force.BOUNDARY and normal_force{ERROR}.BOUNDARY",
+             numbers of the contact of a boundary, as normal_force.BOUNDARY and normal_force{ERROR}.BOUNDARY, and values of the problem by their \
+             JSON Pointers, as /contacts/0/indentation",
             names.join(", "),
         )
     }
@@ -99,6 +111,8 @@ struct Column {
 enum Of {
     Field(Field),
     Label(String),
+    /// A value of the problem, by its JSON Pointer.
+    Parameter(String),
     Number {
         quantity: QuantityName,
         /// The name of the contact; `None`: the only one of the job.
@@ -136,6 +150,7 @@ const FIELDS: &[(&str, Field)] = &[
     ("result_available", Field::Text(|job| <&str>::from(job.result_available).into())),
     ("verdict",          Field::Text(|job| job.verdict.map_or("", <&str>::from).into())),
     ("contacts",         Field::Text(|job| contacts(job).join(", ").into())),
+    ("without_limit",    Field::Whole(without_limit)),
     ("severity",         Field::Text(|job| severity(job).into())),
     ("warnings",         Field::Text(|job| warnings(job).into())),
     ("input_hash",       Field::Text(|job| job.input_hash.clone().into())),
@@ -158,6 +173,15 @@ const NUMBERS: &[QuantityName] = &[
     QuantityName::TangentialDisplacement,
     QuantityName::Tilt,
 ];
+
+/// How many numbers of a result have no limit: they grow on finer meshes, and mean nothing.
+fn without_limit(job: &Job) -> u32 {
+    let without = job
+        .quantities
+        .iter()
+        .filter(|quantity| quantity.method == ErrorMethod::NoLimit);
+    without.count() as u32
+}
 
 /// What the name of a number's column has behind it if the column has the errors.
 const ERROR: &str = "_error";
@@ -194,6 +218,7 @@ fn column(name: &str) -> Option<Column> {
     let of = match (field, name.strip_prefix("label.")) {
         (Some((_, field)), _) => Of::Field(*field),
         (None, Some(key)) => Of::Label(key.to_owned()),
+        (None, None) if name.starts_with('/') => Of::Parameter(name.to_owned()),
         (None, None) => {
             let (number, contact) = match name.split_once('.') {
                 // the error of a number comes before the contact
@@ -250,7 +275,9 @@ fn labels(job: &Job) -> String {
 impl Columns {
     /// The table of these jobs, a row for each. Of a job without a solution the table has no numbers unless they are
     /// wanted (`partial`): they are those of the state at which it stopped.
-    pub fn of(&self, jobs: &[Job], partial: bool) -> Table {
+    ///
+    /// `problems`: the values of each job's problem by their pointers, if there is a column that needs them.
+    pub fn of(&self, jobs: &[Job], partial: bool, problems: &[Leaves]) -> Table {
         let columns = self.0.iter().map(|Column { name, of }| table::Column {
             name: name.clone().into(),
             values: match of {
@@ -265,6 +292,7 @@ impl Columns {
                     let value = |job: &Job| job.labels.get(key).cloned().unwrap_or_default().into();
                     table::Values::Text(jobs.iter().map(value).collect())
                 }
+                Of::Parameter(pointer) => parameter(problems, pointer, jobs.len()),
                 Of::Number {
                     quantity,
                     contact,
@@ -289,10 +317,127 @@ impl Columns {
         }
     }
 
+    /// Whether a column has values of the problem.
+    pub fn has_parameters(&self) -> bool {
+        let mut all = self.0.iter();
+        all.any(|column| matches!(column.of, Of::Parameter(_)))
+    }
+
+    /// These columns, and further ones for the values in which the problems differ.
+    pub fn with_differing(mut self, problems: &[Leaves]) -> Columns {
+        let known: BTreeSet<String> = self.names().map(str::to_owned).collect();
+        let new = differing(problems).into_iter();
+        let new = new.filter(|name| !known.contains(name));
+        self.0.extend(new.filter_map(|name| column(&name)));
+        self
+    }
+
     /// The names of the columns.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.0.iter().map(|column| column.name.as_str())
     }
+}
+
+/// The scalar values of a problem, by their JSON Pointers; a list of more than [`MOST_ITEMS`] numbers or points is one value.
+pub type Leaves = BTreeMap<String, Value>;
+
+/// The largest problem whose values a table has (bytes): one with a mesh in it is larger, and is left empty.
+const MOST_PROBLEM_BYTES: usize = 256 << 10;
+/// The largest number of values of one problem that are compared.
+const MOST_LEAVES: usize = 2000;
+/// The largest number of columns that are added for values that differ.
+const MOST_DIFFERING: usize = 50;
+
+/// The longest list whose items are values of their own, as those of a point are; those of a grid are not.
+const MOST_ITEMS: usize = 3;
+/// The longest text of a value in a table (characters).
+const MOST_TEXT: usize = 60;
+
+/// The scalar values of a problem as JSON.
+pub fn leaves_of(problem: &str) -> Leaves {
+    let mut found = Leaves::new();
+    if let Ok(value) = serde_json::from_str(problem) {
+        leaves(&value, &mut String::new(), &mut found);
+    }
+    found
+}
+
+/// Collects the scalar values in a JSON value.
+fn leaves(value: &Value, pointer: &mut String, found: &mut Leaves) {
+    let length = pointer.len();
+    let mut inside = |token: &str, value: &Value| {
+        *pointer += &format!("/{}", token.replace('~', "~0").replace('/', "~1"));
+        leaves(value, pointer, found);
+        pointer.truncate(length);
+    };
+    match value {
+        Value::Object(members) => members.iter().for_each(|(name, value)| inside(name, value)),
+        Value::Array(items) if items.len() <= MOST_ITEMS || items.iter().any(Value::is_object) => {
+            items
+                .iter()
+                .enumerate()
+                .for_each(|(n, value)| inside(&n.to_string(), value))
+        }
+        scalar if found.len() < MOST_LEAVES => {
+            found.insert(pointer.clone(), scalar.clone());
+        }
+        _ => {}
+    }
+}
+
+/// The column of a value of the problems: numbers if all are numbers, otherwise texts.
+fn parameter(problems: &[Leaves], pointer: &str, jobs: usize) -> table::Values {
+    let values = (0..jobs).map(|n| problems.get(n).and_then(|leaves| value_at(leaves, pointer)));
+    let is_number = |value: &Option<&Value>| value.is_none_or(Value::is_number);
+    if values.clone().all(|value| is_number(&value)) {
+        let number = |value: Option<&Value>| value.and_then(Value::as_f64).unwrap_or(f64::NAN);
+        return table::Values::Real(values.map(number).collect());
+    }
+    let text = |value: Option<&Value>| match value {
+        None => Cow::Borrowed(""),
+        Some(Value::String(text)) => text.clone().into(),
+        Some(Value::Array(items)) => shortened(items).into(),
+        Some(other) => other.to_string().into(),
+    };
+    table::Values::Text(values.map(text).collect())
+}
+
+/// The value at a pointer: also one of the numbers of a long list.
+fn value_at<'a>(leaves: &'a Leaves, pointer: &str) -> Option<&'a Value> {
+    leaves.get(pointer).or_else(|| {
+        let (list, place) = pointer.rsplit_once('/')?;
+        leaves.get(list)?.get(place.parse::<usize>().ok()?)
+    })
+}
+
+/// A list as JSON; of a long one the beginning, and how many items it has.
+fn shortened(items: &[Value]) -> String {
+    let whole = Value::from(items).to_string();
+    let Some((end, _)) = whole.char_indices().nth(MOST_TEXT) else {
+        return whole;
+    };
+    let end = whole[..end].rfind(',').unwrap_or(end);
+    format!("{}, … ({} in all)", &whole[..end], items.len())
+}
+
+/// The pointers of values that are not the same in all problems, in order.
+fn differing(problems: &[Leaves]) -> Vec<String> {
+    let known: BTreeSet<&String> = problems.iter().flat_map(BTreeMap::keys).collect();
+    let with_values: Vec<&Leaves> = problems
+        .iter()
+        .filter(|leaves| !leaves.is_empty())
+        .collect();
+    let differs = |pointer: &&&String| {
+        let mut values = with_values.iter().map(|leaves| leaves.get(**pointer));
+        let first = values.next();
+        values.any(|value| Some(value) != first)
+    };
+    known
+        .iter()
+        .filter(differs)
+        .take(MOST_DIFFERING)
+        .map(|pointer| (*pointer).clone())
+        .collect()
 }
 
 fn reals(jobs: &[Job], value: impl Fn(&Job) -> Option<f64>) -> table::Values {
@@ -328,6 +473,8 @@ pub struct Request {
     pub columns: Option<Columns>,
     /// Whether the numbers of jobs without a solution will do.
     pub partial: bool,
+    /// Whether the values in which the problems differ are added as columns.
+    pub differing: bool,
 }
 
 /// Returns the rows of the jobs that match the filter. A damaged job is an error, as in lists: a row is never left out
@@ -344,12 +491,27 @@ pub fn table<'a>(
             mut paging,
             columns,
             partial,
+            differing: adds_differing,
         } = request;
         paging.size.get_or_insert(MAX_PAGE_SIZE);
         let Page { items, next } = lists::list(service, caller, &filter, order, &paging).await?;
-        let columns = columns.unwrap_or_default();
-        let table = service.work(move || columns.of(&items, partial)).await?;
-        Ok((table, next))
+        let mut columns = columns.unwrap_or_default();
+        let mut problems: Vec<Leaves> = vec![];
+        if adds_differing || columns.has_parameters() {
+            for job in &items {
+                let problem = service.store.small_problem(job.key, MOST_PROBLEM_BYTES);
+                let problem = problem.await?;
+                let read = move || problem.map_or(Leaves::new(), |text| leaves_of(&text));
+                problems.push(service.work(read).await?);
+            }
+        }
+        let make = move || {
+            if adds_differing {
+                columns = columns.with_differing(&problems);
+            }
+            columns.of(&items, partial, &problems)
+        };
+        Ok((service.work(make).await?, next))
     })
 }
 
@@ -389,7 +551,7 @@ mod tests {
 
     fn csv(columns: &str, jobs: &[Job], partial: bool) -> String {
         let columns = COLUMNS.read(columns).unwrap();
-        columns.of(jobs, partial).csv().unwrap()
+        columns.of(jobs, partial, &[]).csv().unwrap()
     }
 
     #[test]
@@ -484,6 +646,43 @@ mod tests {
         assert_eq!(
             csv("status,normal_force", &jobs, true),
             "status,normal_force\r\nfailed,2.5\r\n"
+        );
+    }
+
+    #[test]
+    fn values_of_problems_are_columns_and_those_that_differ_are_found() {
+        let read = |value: Value| {
+            let mut found = Leaves::new();
+            leaves(&value, &mut String::new(), &mut found);
+            found
+        };
+        let problems = [
+            read(json!({ "a": 1, "b": [2, { "c/d": "x" }], "e": true })),
+            read(json!({ "a": 1, "b": [3, { "c/d": "y" }] })),
+            Leaves::new(), // too large to be read
+        ];
+        assert_eq!(differing(&problems), ["/b/0", "/b/1/c~1d", "/e"]);
+        let jobs = [
+            job(Status::Succeeded, &[]),
+            job(Status::Succeeded, &[]),
+            job(Status::Queued, &[]),
+        ];
+        let grid = |last: i32| read(json!({ "x": [0, 1, 2, last] }));
+        let grids = [grid(3), grid(4)];
+        assert_eq!(differing(&grids), ["/x"]);
+        let columns = COLUMNS.read("/x,/x/3").unwrap();
+        assert_eq!(
+            columns.of(&jobs[..2], false, &grids).csv().unwrap(),
+            "/x,/x/3\r\n\"[0,1,2,3]\",3.0\r\n\"[0,1,2,4]\",4.0\r\n"
+        );
+        let long: Vec<Value> = (0..1000).map(Value::from).collect();
+        let short = shortened(&long);
+        assert!(short.starts_with("[0,1,2,") && short.ends_with(", … (1000 in all)"));
+        assert!(short.chars().count() < MOST_TEXT + 20);
+        let columns = COLUMNS.read("/b/0,/b/1/c~1d,/a,/z").unwrap();
+        assert_eq!(
+            columns.of(&jobs, false, &problems).csv().unwrap(),
+            "/b/0,/b/1/c~1d,/a,/z\r\n2.0,x,1.0,\r\n3.0,y,1.0,\r\n,,,\r\n"
         );
     }
 

@@ -18,9 +18,10 @@
 //! | lists, their filters and pages | `lists`, `filters`, `page` |
 //! | jobs and their numbers as one table | `job_table` |
 //! | many jobs at once | `bulk` |
-//! | watching a job | `watch` |
+//! | watching a job, a list of jobs | `watch`, `watch_list` |
 //! | sweeps | `sweeps` |
-//! | results: summary, iterations, profiles, fields, figures | `results`, `history`, `profiles`, `fields` with `fields_in_memory`, `plots` |
+//! | results: summary, iterations, profiles, fields, figures, views for programs that draw | `results`, `history`, `profiles`, `fields` with `fields_in_memory`, `plots`, `views` |
+//! | problems to begin with | `examples` |
 //! | meshes and their uploads | `meshes`, `uploads` |
 //! | identifying the caller | `identify` |
 //! | tokens | `tokens` |
@@ -52,6 +53,7 @@ pub mod lists;
 pub mod retry;
 pub mod submit;
 pub mod watch;
+pub mod watch_list;
 
 // Sweeps, which are solved by jobs.
 pub mod sweeps;
@@ -63,12 +65,14 @@ pub mod history;
 pub mod plots;
 pub mod profiles;
 pub mod results;
+pub mod views;
 
 // Who makes a request; tokens.
 pub mod identify;
 pub mod tokens;
 
 // The service itself.
+pub mod examples;
 pub mod info;
 pub mod metrics;
 pub mod queue;

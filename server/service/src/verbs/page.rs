@@ -4,6 +4,7 @@
 use base::{
     digest::hex,
     job::Job,
+    time::Time,
     values::{Integers, Text},
 };
 use sha2::{Digest, Sha256};
@@ -132,12 +133,14 @@ pub(super) fn list_of_jobs(filter: &Filter, order: Order) -> String {
 
 /// The place directly after a job in a list with this order.
 pub(super) fn after(job: &Job, order: Order) -> Cursor {
-    let time = match order.by {
-        OrderBy::CreatedAt => Some(job.created_at),
-        OrderBy::FinishedAt => job.finished_at,
+    let finished = job.finished_at.map_or(0, Time::micros);
+    let micros = match order.by {
+        OrderBy::CreatedAt => job.created_at.micros(),
+        OrderBy::FinishedAt => finished,
+        OrderBy::RunS => finished - job.started_at.map_or(0, Time::micros),
     };
     Cursor {
-        micros: time.map_or(0, |time| time.micros()),
+        micros,
         key: job.key,
     }
 }

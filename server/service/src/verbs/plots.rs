@@ -335,7 +335,7 @@ impl Loaded {
             profiles.insert(boundary, read(&bytes)?);
         }
         let history = self.history.map_or(Ok(vec![]), StoredHistory::read)?;
-        let mut history: Vec<Iteration> = history.into_iter().map(|timed| timed.row).collect();
+        let mut history: Vec<Iteration> = history.into_iter().map(|row| row.timed.row).collect();
         if let Some((number, _)) = &self.step {
             history.retain(|row| row.step as usize == *number);
         }

@@ -13,7 +13,7 @@ use solver::{
     Checked, Estimate,
     error::{Reason, Violation},
     mesh::Mesh,
-    problem::{Load, Problem, Refine},
+    problem::{Load, MeshInput, Problem, Refine},
     solution::Warning,
 };
 
@@ -39,6 +39,30 @@ pub struct Validation {
     pub first_mesh: Option<Estimate>,
     /// The fingerprint of the problem; absent if `estimate` is absent.
     pub input_hash: Option<String>,
+    /// The problem in words; absent if it cannot be read.
+    pub description: Option<String>,
+}
+
+/// The problem of a deck.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Converted {
+    /// The problem.
+    pub problem: Problem,
+    /// What the solver treats differently from the program that the deck was written for.
+    pub warnings: Vec<Warning>,
+}
+
+/// Reads a deck of Abaqus or CalculiX as a problem; stores nothing. The violations of what is not understood have their lines.
+pub fn convert<'a>(
+    service: &'a Service,
+    _caller: &'a Caller,
+    deck: String,
+) -> BoxFuture<'a, Result<Converted, ApiError>> {
+    Box::pin(async move {
+        let read = service.work(move || files::abaqus::problem_with_warnings(&deck));
+        let (problem, warnings) = read.await?.map_err(ApiError::InvalidProblem)?;
+        Ok(Converted { problem, warnings })
+    })
 }
 
 /// Checks a problem and stores nothing. The violations of an invalid problem are returned as the result, not as an
@@ -95,6 +119,7 @@ pub fn validate<'a>(
                 estimate,
                 first_mesh,
                 input_hash: digest::input_hash(&problem).ok(),
+                description: Some(files::plot::description(&problem)),
             }
         };
         service.work(check).await
@@ -110,6 +135,7 @@ impl Validation {
             estimate: None,
             first_mesh: None,
             input_hash: None,
+            description: None,
         }
     }
 }
@@ -202,6 +228,34 @@ pub(super) fn admit(
         memory_bytes,
         run_s: expected_run_s(&problem, run_s),
     })
+}
+
+/// The stored mesh of a problem whose first mesh is within the memory budget (bytes): what is drawn needs no more.
+pub(super) fn first_mesh_within(
+    problem: &Problem,
+    stored: Option<(MeshInfo, Mesh)>,
+    budget_bytes: u64,
+) -> Result<Option<Mesh>, ApiError> {
+    let own = Problem {
+        mesh: MeshInput {
+            refine: match problem.mesh.refine {
+                Refine::Adaptive(_) => Refine::Times(0),
+                times => times,
+            },
+            ..problem.mesh.clone()
+        },
+        ..problem.clone()
+    };
+    let estimate = estimate(&own, stored.as_ref());
+    let estimate = estimate.map_err(|violation| ApiError::InvalidProblem(vec![violation]))?;
+    if estimate.memory_bytes > budget_bytes {
+        return Err(ApiError::ProblemTooLarge {
+            estimate,
+            budget_bytes,
+        });
+    }
+    check(&own, stored.clone()).map_err(ApiError::InvalidProblem)?;
+    Ok(stored.map(|(_, mesh)| mesh))
 }
 
 /// Estimates the cost of a problem before it is meshed, since the mesh itself may need too much memory.

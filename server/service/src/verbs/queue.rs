@@ -2,16 +2,21 @@
 
 use std::sync::Arc;
 
-use base::caller::Caller;
+use base::{
+    caller::{Caller, Owners},
+    job::{Job, JobId, Status, Waiting as Reason},
+    time::Time,
+};
 use futures_util::future::BoxFuture;
 use schemars::JsonSchema;
 use serde::Serialize;
+use store::{Filter, Order, OrderBy};
 
 use super::service::{Service, detached};
-use crate::error::ApiError;
+use crate::{error::ApiError, queue::LoadPoint};
 
 /// The state of the queue.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct QueueState {
     /// Whether the queue is paused, so that no new job is started.
     pub paused: bool,
@@ -38,6 +43,113 @@ pub fn state(service: &Service, _caller: &Caller) -> QueueState {
         idle: state.idle as u32,
         max_queued: service.config.max_queued,
     }
+}
+
+/// The jobs that wait, and the load of the last hour.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Forecast {
+    /// The caller's waiting jobs, the next to start first: at most a hundred of the thousand oldest.
+    pub waiting: Vec<WaitingJob>,
+    /// The load of the last hour, a point for each minute that the service ran, the oldest first.
+    pub last_hour: Vec<LoadPoint>,
+}
+
+/// A job that waits.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct WaitingJob {
+    /// The job.
+    pub id: JobId,
+    /// Its name.
+    pub name: Option<String>,
+    /// Its owner.
+    pub owner: String,
+    /// Its position in the queue, from 1; 0 for a job that is coalesced into a running one.
+    pub position: i64,
+    /// Why it waits.
+    pub reason: Reason,
+    /// In how many seconds it starts, if jobs run as long as those that ended last; absent if that is unknown, and while the
+    /// queue is paused.
+    pub starts_in_s: Option<f64>,
+}
+
+/// The jobs that wait, as they are listed for a forecast.
+const MOST_LISTED: i64 = 1000;
+/// The jobs that wait, in an answer.
+const MOST_WAITING: usize = 100;
+/// The jobs that have ended lately, whose mean time to run is that of those that wait.
+const MOST_ENDED: i64 = 20;
+
+/// Returns the jobs that wait, with a forecast of their starts, and the load of the last hour.
+pub fn waiting<'a>(
+    service: &'a Service,
+    caller: &'a Caller,
+) -> BoxFuture<'a, Result<Forecast, ApiError>> {
+    Box::pin(async move {
+        let store = &service.store;
+        let with_status = |status| Filter {
+            statuses: vec![status],
+            ..Filter::default()
+        };
+        let list = |status, owners, order, most| {
+            let filter = with_status(status);
+            async move { store.some_jobs(owners, &filter, order, None, most).await }
+        };
+        let newest_end = Order {
+            by: OrderBy::FinishedAt,
+            descending: true,
+        };
+        let all = caller.visible_owners();
+        let mut queued = list(Status::Queued, all, Order::OLDEST_FIRST, MOST_LISTED)
+            .await?
+            .items;
+        // of all owners: they share the workers
+        let running = list(
+            Status::Running,
+            Owners::All,
+            Order::OLDEST_FIRST,
+            MOST_LISTED,
+        )
+        .await?
+        .items;
+        let ended = list(Status::Succeeded, Owners::All, newest_end, MOST_ENDED)
+            .await?
+            .items;
+        let state = state(service, caller);
+        let mean = mean(ended.iter().filter_map(|job| job.run_s));
+        let now = Time::now();
+        let rest = |job: &Job| {
+            let told = job.progress.as_ref().and_then(|progress| progress.eta_s);
+            let ran = job.started_at.map_or(0.0, |start| start.seconds_until(now));
+            Some(told.unwrap_or((mean? - ran).max(0.0)))
+        };
+        let busy: f64 = running.iter().filter_map(rest).sum();
+        queued.sort_by_key(|job| job.queue.as_ref().map_or(i64::MAX, |queue| queue.position));
+        let waiting = queued.into_iter().filter_map(|job| {
+            let queue = job.queue?;
+            let starts = |mean: f64| {
+                let before = busy + queue.ahead as f64 * mean;
+                before / f64::from(state.workers.max(1))
+            };
+            let known = !state.paused && queue.position > 0;
+            Some(WaitingJob {
+                id: job.id,
+                name: job.name,
+                owner: job.owner,
+                position: queue.position,
+                reason: queue.reason,
+                starts_in_s: mean.filter(|_| known).map(starts),
+            })
+        });
+        Ok(Forecast {
+            waiting: waiting.take(MOST_WAITING).collect(),
+            last_hour: service.queue.last_hour(),
+        })
+    })
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    (count > 0.0).then(|| sum / count)
 }
 
 /// Pauses the queue: no more jobs are started until it is resumed, also after a restart. Running jobs continue, and new

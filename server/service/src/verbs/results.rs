@@ -11,6 +11,7 @@ use base::{
 use futures_util::future::BoxFuture;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use solver::accuracy::{Assessment, assessment};
 use store::Snapshot;
 
 use super::{
@@ -37,6 +38,8 @@ pub struct JobResult {
     pub result_available: ResultAvailable,
     /// The summary of the last finished load step.
     pub summary: Summary,
+    /// The verdict on the result as data and in a sentence; absent without stated errors.
+    pub assessment: Option<Assessment>,
     /// The finished load steps.
     pub steps: Vec<StepResult>,
 }
@@ -117,9 +120,11 @@ async fn read_result(
     };
     let read = move |(result_available, summary, steps): (_, Vec<u8>, Option<Vec<u8>>)| {
         let steps = steps.map_or(Ok(vec![]), |steps| read(&steps));
+        let summary: Summary = read(&summary)?;
         let content = JobResult {
             result_available,
-            summary: read(&summary)?,
+            assessment: assessment(&summary.solution),
+            summary,
             steps: steps?,
         };
         Ok(Found {

@@ -50,6 +50,8 @@ pub struct Service {
     pub(super) fields_in_memory: FieldsInMemory,
     /// The uploads that are arriving.
     uploads: Arc<Uploads>,
+    /// A name for this run of the service: numbers that are kept in memory only begin anew with the next one.
+    pub(super) run: String,
 }
 
 /// The stored bytes of an owner, and their limit.
@@ -104,6 +106,7 @@ impl Service {
             sent: Limit::new(config.max_sent_bytes),
             fields_in_memory: FieldsInMemory::default(),
             uploads: Arc::default(),
+            run: Uuid::now_v7().simple().to_string(),
             config,
         }
     }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use base::job::JobId;
+use base::{job::JobId, time::Time};
 use fastrand::Rng;
 
 use super::*;
@@ -55,6 +55,26 @@ fn matches(filter: &Filter, job: &Job) -> bool {
         && given(&filter.owner, Some(&job.owner))
         && given(&filter.name, job.name.as_deref())
         && given(&filter.input_hash, Some(&job.input_hash))
+        && filter.name_contains.as_deref().is_none_or(|part| {
+            let name = job.name.as_deref().unwrap_or_default();
+            name.to_ascii_lowercase()
+                .contains(&part.to_ascii_lowercase())
+        })
+        && filter.text.as_deref().is_none_or(|text| {
+            let (name, labels) = (
+                job.name.clone().unwrap_or_default(),
+                format!("{:?}", job.labels),
+            );
+            let all = format!("{name}\n{}\n{}\n{labels}", job.owner, job.id);
+            all.to_ascii_lowercase()
+                .contains(&text.to_ascii_lowercase())
+        })
+        && filter.pinned.is_none_or(|pinned| job.pinned == pinned)
+        && (filter.ids.is_empty() || filter.ids.contains(&job.id))
+        && filter
+            .excluded_labels
+            .iter()
+            .all(|(key, value)| job.labels.get(key) != Some(value))
         && filter
             .labels
             .iter()
@@ -94,6 +114,23 @@ fn some_filter(jobs: &[Job], dice: &mut Rng) -> Filter {
     if now_and_then() {
         filter.input_hash = Some(b.input_hash.clone());
     }
+    if now_and_then() && now_and_then() {
+        filter.name_contains = Some("RUN".into());
+    }
+    if now_and_then() && now_and_then() {
+        filter.text = Some(b.owner.to_ascii_uppercase());
+    }
+    if now_and_then() && now_and_then() {
+        filter.ids = jobs.iter().step_by(3).map(|job| job.id).collect();
+    }
+    if now_and_then() && now_and_then() {
+        filter.pinned = Some(false);
+    }
+    for (key, value) in &a.labels {
+        if now_and_then() && now_and_then() {
+            filter.excluded_labels.push((key.clone(), value.clone()));
+        }
+    }
     for (key, value) in &d.labels {
         if now_and_then() {
             filter.labels.push((key.clone(), value.clone()));
@@ -123,7 +160,7 @@ async fn pages_have_the_jobs_that_match_in_order() {
     for _ in 0..400 {
         let filter = some_filter(&jobs, &mut dice);
         let owners = [Owners::All, Owners::Only("ada".into())][dice.usize(0..2)].clone();
-        let by = [OrderBy::CreatedAt, OrderBy::FinishedAt][dice.usize(0..2)];
+        let by = [OrderBy::CreatedAt, OrderBy::FinishedAt, OrderBy::RunS][dice.usize(0..3)];
         let order = Order {
             by,
             descending: dice.bool(),
@@ -131,6 +168,10 @@ async fn pages_have_the_jobs_that_match_in_order() {
         let at = |job: &Job| match by {
             OrderBy::CreatedAt => Some((job.created_at, job.key)),
             OrderBy::FinishedAt => job.finished_at.map(|time| (time, job.key)),
+            OrderBy::RunS => {
+                let run = job.finished_at?.micros() - job.started_at?.micros();
+                Some((Time::from_micros(run), job.key))
+            }
         };
         let mine = |job: &&Job| matches!(owners, Owners::All) || job.owner == "ada";
         let found = jobs.iter().filter(mine).filter(|job| matches(&filter, job));

@@ -76,7 +76,7 @@ async fn lists_are_read_within_a_part_of_an_index() {
         ..mine.clone()
     };
     let place = |n| Some(Cursor { micros: n, key: n });
-    for by in [OrderBy::CreatedAt, OrderBy::FinishedAt] {
+    for by in [OrderBy::CreatedAt, OrderBy::FinishedAt, OrderBy::RunS] {
         for descending in [true, false] {
             let order = Order { by, descending };
             for (after, last) in [(None, None), (place(5), place(3)), (None, place(3))] {
@@ -113,7 +113,7 @@ async fn lists_are_read_within_a_part_of_an_index() {
             }
         }
     }
-    let counted = list::counted(&mine, Some(GroupBy::Status));
+    let counted = list::counted(&mine, Some(&GroupBy::Status));
     let steps = plan(&store, counted.sql()).await;
     assert!(
         steps[0].contains("COVERING INDEX job_by_owner"),

@@ -24,9 +24,10 @@ use service::{
 };
 
 use super::{
-    operations,
+    operations, page,
     reply::{is_grpc, refusal},
     revocation::end_when_revoked,
+    session,
 };
 
 /// Stores the caller of a request in its extensions, where handlers and rpcs read it; refuses a request that the caller
@@ -132,6 +133,9 @@ fn access(request: &Request) -> Access {
     let Some(route) = request.extensions().get::<MatchedPath>() else {
         return Access::Open; // 404
     };
+    if route.as_str() == page::FILES {
+        return Access::Open; // the page, without any data
+    }
     let method = match request.method() {
         // answered by the handler of GET
         method if *method == Method::HEAD => "GET",
@@ -146,8 +150,8 @@ fn access(request: &Request) -> Access {
     }
 }
 
-/// The credentials of a request: a bearer token, or a token as the password that a browser asks for, and the users
-/// named in `user_header`.
+/// The credentials of a request: a bearer token, or a token as the password that a browser asks for, the tokens of a
+/// browser's sessions, and the users named in `user_header`.
 fn credentials(headers: &HeaderMap, user_header: Option<&header::HeaderName>) -> Credentials {
     let mut sent = headers.get_all(header::AUTHORIZATION).iter();
     let token = sent.next().map(|value| {
@@ -171,6 +175,7 @@ fn credentials(headers: &HeaderMap, user_header: Option<&header::HeaderName>) ->
     let users = user_header.map(|name| headers.get_all(name).iter());
     Credentials {
         token,
+        cookies: session::cookies(headers),
         users: users
             .into_iter()
             .flatten()

@@ -200,6 +200,14 @@ pub(super) struct TokenFields {
     expires_in_s: Option<f64>,
 }
 
+/// The body of a request that begins a session.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct LogIn {
+    /// A token, with its secret.
+    token: String,
+}
+
 /// A body with a problem and nothing else.
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
@@ -394,6 +402,12 @@ pub(super) fn token(text: &str) -> Result<TokenRequest, ApiError> {
     })
 }
 
+/// Reads a body that begins a session; returns the token.
+pub(super) fn session(text: &str) -> Result<String, ApiError> {
+    static BODY: Body<LogIn> = Body::new();
+    Ok(whole(&BODY, text)?.token)
+}
+
 /// A body with a problem and nothing else.
 pub(super) fn bare_problem(text: &str) -> Result<Result<Problem, Vec<Violation>>, ApiError> {
     static BODY: Body<BareProblem> = Body::new();
@@ -437,6 +451,7 @@ mod tests {
             refused(merge_patch(OTHER).map(|_| ())),
             refused(retry(OTHER).map(|_| ())),
             refused(token(OTHER).map(|_| ())),
+            refused(session(OTHER).map(|_| ())),
         ] {
             let unknown = |v: &Violation| v.pointer == "/other" && v.reason == Reason::UnknownName;
             assert!(found.iter().any(unknown), "{found:?}");

@@ -16,6 +16,7 @@ use service::{error::ApiError, transfer::Received, verbs::Service};
 use super::{
     body,
     input::{Input, RawInput},
+    origin::Https,
 };
 
 /// The state that all handlers share.
@@ -31,6 +32,8 @@ pub(super) struct Call {
     pub(super) service: Arc<Service>,
     pub(super) caller: Caller,
     pub(super) headers: HeaderMap,
+    /// Whether the client has used https.
+    pub(super) https: bool,
     pub(super) body: Body,
     /// Counts the part of the body that is in memory.
     pub(super) received: Received,
@@ -116,6 +119,8 @@ where
                 let caller = caller.ok_or_else(|| {
                     ApiError::internal("the caller of a request was not identified")
                 })?;
+                let https = parts.extensions.get::<Https>();
+                let https = https.is_some_and(|Https(https)| *https);
                 let received = parts.extensions.remove::<Received>();
                 let received = received.unwrap_or_else(|| Received::new(&site.service.received));
                 let raw = RawInput::new(variables, parts.uri.query(), &parts.headers);
@@ -128,6 +133,7 @@ where
                     service: site.service,
                     caller,
                     headers: parts.headers,
+                    https,
                     body,
                     received,
                     openapi: site.openapi,

@@ -99,6 +99,16 @@ impl Coding {
     /// The coding that the client prefers, zstd if both are equal; `*` is gzip, and the weight 0 refuses a coding (RFC
     /// 9110, 12.5.3). `None`: no coding.
     pub(super) fn accepted(headers: &HeaderMap) -> Option<Coding> {
+        let (gzip, zstd) = Coding::weights(headers);
+        if zstd >= gzip {
+            (zstd > 0.0).then_some(Coding::Zstd)
+        } else {
+            Some(Coding::Gzip)
+        }
+    }
+
+    /// The weights that the client gives gzip and zstd.
+    fn weights(headers: &HeaderMap) -> (f32, f32) {
         let (mut gzip, mut zstd, mut any) = (None, None, 0.0);
         let values = headers.get_all(header::ACCEPT_ENCODING).iter();
         let items = values.filter_map(|value| value.to_str().ok());
@@ -114,12 +124,12 @@ impl Coding {
                 None => {}
             }
         }
-        let (gzip, zstd) = (gzip.unwrap_or(any), zstd.unwrap_or(0.0));
-        if zstd >= gzip {
-            (zstd > 0.0).then_some(Coding::Zstd)
-        } else {
-            Some(Coding::Gzip)
-        }
+        (gzip.unwrap_or(any), zstd.unwrap_or(0.0))
+    }
+
+    /// Whether the client accepts gzip.
+    pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
+        Coding::weights(headers).0 > 0.0
     }
 
     /// Encodes a body in this coding as it is sent. `share` is the memory of the encoder, and is given back with the

@@ -58,6 +58,7 @@ fn is_worth_it(response: &Response) -> bool {
         "application/jsonl",
         "application/vnd.vtk",
         "image/svg+xml",
+        "application/vnd.signorini.view",
     ]
     .iter()
     .any(|start| kind.starts_with(start))

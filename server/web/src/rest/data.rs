@@ -34,6 +34,18 @@ pub(super) struct Part {
     if_range: Option<String>,
 }
 
+impl Part {
+    /// The answer to a client that has the file with this entity tag already; `None` if it has not.
+    pub(super) fn known(&self, tag: Option<&str>) -> Option<Response> {
+        let tag = format!("\"{}\"", tag?);
+        let known = self.known.as_ref()?.contain(&tag);
+        known.then(|| {
+            let tag = [(header::ETAG, tag), (header::VARY, "Accept".to_owned())];
+            with(StatusCode::NOT_MODIFIED.into_response(), tag)
+        })
+    }
+}
+
 impl Input for PartHeaders {
     type Value = Part;
 
@@ -78,6 +90,8 @@ pub(super) struct File {
     pub(super) bytes: u64,
     /// The SHA-256 of the file.
     pub(super) digest: Vec<u8>,
+    /// The entity tag, without its quotes; `None`: the SHA-256.
+    pub(super) tag: Option<String>,
 }
 
 /// Answers with a file whose bytes are in memory, or with the requested part of it.
@@ -87,12 +101,24 @@ pub(super) fn whole(
     name: String,
     bytes: impl Into<Bytes>,
 ) -> Result<Response, ApiError> {
+    tagged(part, format, name, bytes, None)
+}
+
+/// Answers with a file whose bytes are in memory, and whose entity tag was known before they were made.
+pub(super) fn tagged(
+    part: &Part,
+    format: Format,
+    name: String,
+    bytes: impl Into<Bytes>,
+    tag: Option<String>,
+) -> Result<Response, ApiError> {
     let bytes = bytes.into();
     let file = File {
         format,
         name,
         bytes: bytes.len() as u64,
         digest: Sha256::digest(&bytes).to_vec(),
+        tag,
     };
     answer(part, &file, |range| {
         Body::from(bytes.slice(range.start as usize..range.end as usize))
@@ -105,7 +131,8 @@ pub(super) fn answer(
     file: &File,
     body: impl FnOnce(Range<u64>) -> Body,
 ) -> Result<Response, ApiError> {
-    let tag = format!("\"{}\"", hex(&file.digest));
+    let tag = file.tag.clone().unwrap_or_else(|| hex(&file.digest));
+    let tag = format!("\"{tag}\"");
     let digest = format!("sha-256=:{}:", STANDARD.encode(&file.digest));
     let vary = "Accept".to_owned();
     let known = [

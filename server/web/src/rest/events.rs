@@ -1,6 +1,8 @@
 //! The operation `/v1/jobs/{id}/events`: past events, then live ones, as server-sent events or as JSON Lines.
 
-use std::{cmp::Ordering, convert::Infallible, pin::pin, sync::Arc, time::Duration};
+use std::{
+    cmp::Ordering, collections::BTreeSet, convert::Infallible, pin::pin, sync::Arc, time::Duration,
+};
 
 use async_stream::stream;
 use axum::{
@@ -8,23 +10,36 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use base::{event::StoredEvent, job::JobId, sweep::SweepEvent, values::Integers};
+use base::{
+    event::StoredEvent,
+    job::JobId,
+    sweep::SweepEvent,
+    values::{Integers, Text},
+};
 use futures_util::{Stream, StreamExt};
+use serde_json::json;
 use service::{
     error::ApiError,
     parameters::Parameter,
-    verbs::watch::{AFTER_SEQ, watch},
+    verbs::{
+        watch::{AFTER_SEQ, watch},
+        watch_list::{self, AFTER, ListEvent, ListPayload},
+    },
     violations,
 };
+use store::Filter;
 use tokio::time::timeout;
 
 use super::{
     accept::{accepted, prefers, weight},
     call::Call,
+    job_row::row,
 };
 
 /// The interval of the comments that keep a connection open through proxies and clients.
 const PING: Duration = Duration::from_secs(15);
+/// How soon a browser connects again after a stream was cut (ms).
+const RETRY_MS: u32 = 1000;
 /// The most events that are sent together: each watcher holds the text of so many in memory.
 const AT_ONCE: usize = 16;
 /// The media type of server-sent events.
@@ -37,6 +52,13 @@ pub(super) const LAST_EVENT_ID: Parameter<Integers> = Parameter {
     name: "Last-Event-ID",
     meaning: "Same as after_seq; takes precedence over it",
     values: AFTER_SEQ.values,
+};
+
+/// The header that a browser adds when it reconnects to the stream of a list.
+pub(super) const LAST_LIST_EVENT_ID: Parameter<Text> = Parameter {
+    name: "Last-Event-ID",
+    meaning: "Same as after; takes precedence over it",
+    values: AFTER.values,
 };
 
 pub(super) async fn events(
@@ -83,8 +105,8 @@ fn chosen(headers: &HeaderMap) -> Result<Encoding, ApiError> {
 
 /// An event with a number and a type.
 pub(super) trait Numbered: Send + 'static {
-    /// The event's number.
-    fn seq(&self) -> i64;
+    /// The id after which a stream goes on; `None` for an event before the last of those that belong together.
+    fn id(&self) -> Option<String>;
     /// The event's type.
     fn kind(&self) -> &str;
     /// The event as JSON.
@@ -92,8 +114,8 @@ pub(super) trait Numbered: Send + 'static {
 }
 
 impl Numbered for Arc<StoredEvent> {
-    fn seq(&self) -> i64 {
-        self.seq
+    fn id(&self) -> Option<String> {
+        Some(self.seq.to_string())
     }
 
     fn kind(&self) -> &str {
@@ -106,8 +128,8 @@ impl Numbered for Arc<StoredEvent> {
 }
 
 impl Numbered for SweepEvent {
-    fn seq(&self) -> i64 {
-        self.seq
+    fn id(&self) -> Option<String> {
+        Some(self.seq.to_string())
     }
 
     fn kind(&self) -> &str {
@@ -117,6 +139,57 @@ impl Numbered for SweepEvent {
     fn json(&self) -> serde_json::Result<String> {
         serde_json::to_string(self)
     }
+}
+
+/// An event of a list as it is sent: jobs have the fields that were asked for.
+pub(super) struct SentListEvent {
+    id: Option<String>,
+    kind: &'static str,
+    json: serde_json::Result<String>,
+}
+
+impl Numbered for SentListEvent {
+    fn id(&self) -> Option<String> {
+        self.id.clone()
+    }
+
+    fn kind(&self) -> &str {
+        self.kind
+    }
+
+    fn json(&self) -> serde_json::Result<String> {
+        match &self.json {
+            Ok(json) => Ok(json.clone()),
+            Err(error) => Err(serde::ser::Error::custom(error)),
+        }
+    }
+}
+
+pub(super) async fn list_events(
+    call: Call,
+    filter: Filter,
+    fields: Option<BTreeSet<&'static str>>,
+    asked: Option<String>,
+    seen: Option<String>,
+) -> Result<Response, ApiError> {
+    let events = watch_list::watch(&call.service, &call.caller, filter, seen.or(asked))?;
+    let fields = fields.map(Arc::new);
+    let events = events.map(move |event| {
+        let ListEvent { id, payload } = event?;
+        let kind = payload.kind();
+        let mut with_id = match payload {
+            ListPayload::Job { job } => serde_json::to_value(row(*job, fields.as_ref()))
+                .map(|job| json!({ "type": kind, "job": job })),
+            other => serde_json::to_value(other),
+        };
+        // also in JSON Lines, which have no place for it
+        if let (Ok(value), Some(id)) = (&mut with_id, &id) {
+            value["after"] = json!(id);
+        }
+        let json = with_id.map(|value| value.to_string());
+        Ok(SentListEvent { id, kind, json })
+    });
+    answer(&call.headers, Some(events))
 }
 
 /// The format of a stream of events.
@@ -164,6 +237,9 @@ fn pieces<E: Numbered>(
 ) -> impl Stream<Item = String> + Send {
     stream! {
         let mut events = pin!(events.ready_chunks(AT_ONCE));
+        if let Encoding::Stream = encoding {
+            yield format!("retry: {RETRY_MS}\n\n");
+        }
         loop {
             let next = match encoding {
                 Encoding::Stream => timeout(PING, events.next()).await,
@@ -189,12 +265,15 @@ fn pieces<E: Numbered>(
 
 /// Adds an event to a text in the format `encoding`. JSON has no line breaks.
 fn add(event: &impl Numbered, encoding: Encoding, text: &mut String) -> Result<(), ApiError> {
-    let (seq, kind) = (event.seq(), event.kind());
     let json = event.json().map_err(ApiError::internal)?;
-    text.push_str(&match encoding {
-        Encoding::Stream => format!("id: {seq}\nevent: {kind}\ndata: {json}\n\n"),
-        Encoding::Lines => format!("{json}\n"),
-    });
+    if let Encoding::Lines = encoding {
+        text.push_str(&format!("{json}\n"));
+        return Ok(());
+    }
+    if let Some(id) = event.id() {
+        text.push_str(&format!("id: {id}\n"));
+    }
+    text.push_str(&format!("event: {}\ndata: {json}\n\n", event.kind()));
     Ok(())
 }
 

@@ -24,8 +24,13 @@ impl Input for Filters {
     }
 
     fn extract(&self, raw: &RawInput<'_>) -> Result<Filter, ApiError> {
+        // `label.a!=b` is the name `label.a!` and the value `b`
+        let excludes = |(key, _): &(String, String)| key.ends_with('!');
+        let (excluded, labels) = raw.keyed(LABEL.name).partition(excludes);
+        let named = |(key, value): (String, String)| (key.trim_end_matches('!').to_owned(), value);
         let mut filter = Filter {
-            labels: raw.keyed(LABEL.name).collect(),
+            labels,
+            excluded_labels: Vec::into_iter(excluded).map(named).collect(),
             ..Filter::default()
         };
         for field in store::FILTERS {
@@ -58,6 +63,9 @@ mod tests {
                 "poor",
                 "2026-01-31T12:00:00Z",
                 "sweep_01890a5d-ac96-774b-bcce-b302099a8057",
+                "job_01890a5d-ac96-774b-bcce-b302099a8057",
+                "true",
+                "no_contact",
             ]
             .into_iter()
             .find_map(|value| {

@@ -15,14 +15,22 @@ use axum::{
 use base::caller::Peer;
 use service::{config::ProxyTrust, error::ApiError};
 
+/// The mark of a request for the path prefix itself, without a slash: addresses in the page would lead elsewhere.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WithoutSlash;
+
 /// Removes `prefix` from the beginning of the request's path; the request is unchanged if its path does not begin with
 /// it.
 pub(super) fn without_prefix(mut request: Request, prefix: &str) -> Request {
-    let rest = request.uri().path_and_query().and_then(|whole| {
+    let whole = request.uri().path_and_query().cloned();
+    let rest = whole.and_then(|whole| {
         let rest = whole.as_str().strip_prefix(prefix)?;
         match rest.chars().next() {
             Some('/') => PathAndQuery::try_from(rest).ok(),
-            None | Some('?') => PathAndQuery::try_from(format!("/{rest}")).ok(),
+            None | Some('?') => {
+                request.extensions_mut().insert(WithoutSlash);
+                PathAndQuery::try_from(format!("/{rest}")).ok()
+            }
             Some(_) => None, // only the beginning of another name
         }
     });

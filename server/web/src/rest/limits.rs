@@ -81,12 +81,12 @@ fn is_of_grpc(path: &str) -> bool {
 
 /// Whether a request changes nothing, so that it may be repeated.
 fn only_reads(grpc: bool, method: &Method, path: &str) -> bool {
-    const READING: [&str; 7] = [
-        "Get", "List", "Count", "Wait", "Watch", "Stream", "Validate",
+    const READING: [&str; 8] = [
+        "Get", "List", "Count", "Wait", "Watch", "Stream", "Validate", "Convert",
     ];
     match path.strip_prefix("/signorini.v1.JobService/") {
         Some(name) => READING.iter().any(|prefix| name.starts_with(prefix)),
-        None => grpc || method.is_safe() || path == "/v1/problems/validate",
+        None => grpc || method.is_safe() || path.starts_with("/v1/problems/"),
     }
 }
 

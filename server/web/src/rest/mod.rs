@@ -25,18 +25,20 @@
 //! | refused requests in the log | `refused` |
 //! | streams of events; figures | `events`, `plots` |
 //! | the page at /docs | `docs` |
+//! | the page for people: its files, which are in `server/web/page`; sessions of browsers | `page`, `session` |
+//! | what browsers are told | `browser` |
 
 // Requests: parameters and headers, bodies, the caller.
 mod accept;
 mod authenticate;
 mod bodies;
 mod body;
+mod browser;
 mod call;
 mod coding;
 mod filters;
 mod forwarded;
 mod headers;
-mod home;
 mod input;
 mod limits;
 mod origin;
@@ -44,6 +46,7 @@ mod origin;
 // Answers.
 mod compressed;
 mod data;
+mod job_row;
 mod refused;
 mod reply;
 mod request_report;
@@ -53,7 +56,9 @@ mod revocation;
 // Answers that are more than a translation.
 mod docs;
 mod events;
+mod page;
 mod plots;
+mod session;
 
 // The list of operations, and what is made from it.
 mod openapi;

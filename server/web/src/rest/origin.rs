@@ -26,15 +26,23 @@ use super::{
     reply::{is_grpc, refusal},
 };
 
+/// Whether the client of a request has used https, as far as is known.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Https(pub(super) bool);
+
 /// Refuses requests that name no host or a host of others, or that come from a page of another site.
 pub(super) async fn own_site(
     State(service): State<Arc<Service>>,
-    request: Request,
+    mut request: Request,
     next: Next,
 ) -> Response {
     let config = &service.config;
     match check(&request, &config.web, &config.trust, config.tls.is_on()) {
-        Ok(()) => next.run(request).await,
+        Ok(()) => {
+            let https = forwarded::https(&request, &config.trust).unwrap_or(config.tls.is_on());
+            request.extensions_mut().insert(Https(https));
+            next.run(request).await
+        }
         Err(error) => refusal(is_grpc(&request), request.uri().path(), error),
     }
 }

@@ -11,9 +11,11 @@ use service::{
     formats::Format,
     parameters::Description,
     verbs::{
+        jobs,
         plots::{self as verbs, Figure, SIZE, STRESS, STYLE, THEME, XLIM, YLIM, YLIM_BELOW},
         profiles::STEP,
         results::PARTIAL,
+        views,
     },
 };
 
@@ -100,6 +102,15 @@ pub(super) async fn plot(
             known: known.join(", "),
         });
     }
+    let job = jobs::get(&call.service, &call.caller, id).await?;
+    let what = format!(
+        "{plot:?} {format:?} {:?} {:?} {:?} {:?} {:?} {step:?} {partial:?}",
+        look.theme, look.size, look.texts, look.stress, look.limits
+    );
+    let tag = views::tag_of(&job, &what);
+    if let Some(known) = part.known(tag.as_deref()) {
+        return Ok(marked(known, job.result_available));
+    }
     let figure = Figure {
         plot,
         format,
@@ -115,7 +126,7 @@ pub(super) async fn plot(
     };
     let found = verbs::plot(&call.service, &call.caller, id, figure).await?;
     let name = format!("{id}.{}", plot.as_str());
-    let mut answer = data::whole(&part, format, name, found.content)?;
+    let mut answer = data::tagged(&part, format, name, found.content, tag)?;
     let headers = answer.headers_mut();
     // a browser shows it
     if let Some(shown) = headers.get(header::CONTENT_DISPOSITION).and_then(inline) {

@@ -27,11 +27,9 @@ fn add_headers(headers: &mut HeaderMap, error: &ApiError) {
         headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
     }
     if let ApiError::Unauthenticated(_) = error {
-        // a browser takes the second one, and asks for a password: the token
-        const WAYS: HeaderValue = HeaderValue::from_static(
-            "Bearer realm=\"signorini\", Basic realm=\"signorini: any name, and a token as the password\"",
-        );
-        headers.insert(header::WWW_AUTHENTICATE, WAYS);
+        // `browser` adds another way, on a line of its own
+        const BEARER: HeaderValue = HeaderValue::from_static("Bearer realm=\"signorini\"");
+        headers.insert(header::WWW_AUTHENTICATE, BEARER);
     }
     if let ApiError::UnsupportedEncoding(_) = error {
         const CODINGS: HeaderValue = HeaderValue::from_static(coding::UNDERSTOOD);

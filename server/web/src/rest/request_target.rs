@@ -9,7 +9,7 @@ use axum::{
 };
 use tonic::Code;
 
-use super::{operations, reply::is_grpc};
+use super::{operations, page, reply::is_grpc};
 
 /// The label of a target that is neither a route nor an rpc.
 pub(super) const UNKNOWN: &str = "unknown";
@@ -49,6 +49,9 @@ impl RequestTarget {
         }
         let method = method(request.method());
         match request.extensions().get::<MatchedPath>() {
+            Some(route) if route.as_str() == page::FILES => {
+                RequestTarget::Route(method, route.clone())
+            }
             // a service of the contract, without such a method
             Some(route) if route.as_str().contains('*') => RequestTarget::Rpc(UNKNOWN),
             Some(route) => RequestTarget::Route(method, route.clone()),

@@ -11,14 +11,16 @@ use tower::{
 use tower_http::catch_panic::CatchPanicLayer;
 
 use super::{
-    authenticate::authenticate, call::AppState, compressed::compressed, forwarded, limits::limits,
-    openapi::openapi, operations, origin, reply, request_report,
+    authenticate::authenticate, browser, call::AppState, compressed::compressed, forwarded,
+    limits::limits, openapi::openapi, operations, origin, page, reply, request_report,
 };
 
 /// All routes, REST and gRPC. Unknown paths are answered by `reply::not_found`.
 pub fn router(service: Arc<Service>, grpc: Router) -> Router {
     let (prefix, sent) = (service.config.web.path_prefix.clone(), service.sent.clone());
+    let is_shared = !service.config.web.allowed_origins.is_empty();
     let routes = operations::routes()
+        .merge(page::routes())
         .method_not_allowed_fallback(async || ApiError::MethodNotAllowed)
         .with_state(AppState {
             service: service.clone(),
@@ -44,6 +46,11 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         .layer(middleware::from_fn_with_state(
             service.clone(),
             origin::own_site,
+        ))
+        // outside of all that refuses: also refusals are read by browsers
+        .layer(middleware::from_fn_with_state(
+            is_shared,
+            browser::for_browsers,
         ))
         // outermost: it sees what the client is answered
         .layer(middleware::from_fn_with_state(

@@ -1,6 +1,9 @@
 //! The operations on jobs that exist: get, list, wait, watch, edit, cancel, delete.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use axum::{
     Json,
@@ -23,12 +26,14 @@ use service::{
     parameters::Parameter,
     verbs::{
         bulk::{self, BulkResult},
-        job_table::{self, COLUMNS, Columns, NEXT_PAGE_TOKEN, ROWS},
+        job_table::{self, COLUMNS, Columns, DIFFERING, NEXT_PAGE_TOKEN, ROWS},
         jobs::{self as verbs, Cancellation, ID, LabelChanges},
-        lists::{self, Count, GROUP_BY, ORDER_BY},
+        lists::{self, Count, FIELDS, GROUP_BY, ORDER_BY},
         page::{PAGE_SIZE, PAGE_TOKEN, Paging},
         results::PARTIAL,
+        views,
         watch::{self, AFTER_SEQ, UNTIL, Until, WAIT},
+        watch_list::{AFTER, ListPayload},
     },
 };
 use solver::problem::Problem;
@@ -45,15 +50,16 @@ use crate::rest::{
     body::is_merge_patch,
     call::Call,
     data::{self, PART, Part},
-    events::{self, LAST_EVENT_ID},
+    events::{self, LAST_EVENT_ID, LAST_LIST_EVENT_ID},
     filters::FILTERS,
     headers::{Header, IF_MATCH, IF_NONE_MATCH, Tags, version_tag},
+    job_row::{JobRow, row},
 };
 
 pub(super) fn operations() -> Vec<Operation> {
     const TABLE: FormatOf = FormatOf(Format::OF_TABLES);
     vec![
-        get(READ, "/v1/jobs", (FILTERS, PAGE_SIZE, PAGE_TOKEN, ORDER_BY), list_jobs)
+        get(READ, "/v1/jobs", (FILTERS, FIELDS, PAGE_SIZE, PAGE_TOKEN, ORDER_BY), list_jobs)
             .rpcs(&["ListJobs"])
             .summary("Lists jobs, newest first")
             .answers(200, "A page of jobs. It may be short or empty before the list ends, since a limited number of jobs is checked for each page: the list ends where there is no next_page_token", json::<List>())
@@ -65,7 +71,7 @@ pub(super) fn operations() -> Vec<Operation> {
         get(
             READ,
             "/v1/jobs/table",
-            (FILTERS, COLUMNS, TABLE, NUMBERS_OF_ALL, ROWS, PAGE_TOKEN, ORDER_BY, PART),
+            (FILTERS, (COLUMNS, DIFFERING), TABLE, NUMBERS_OF_ALL, ROWS, PAGE_TOKEN, ORDER_BY, PART),
             list_job_table,
         )
         .rest_only("GetJobTable")
@@ -84,11 +90,20 @@ pub(super) fn operations() -> Vec<Operation> {
             .rpcs(&["GetJobProblem"])
             .summary("Returns the exact input of a job, with its defaults filled in")
             .answers(200, "The problem", the_problem()),
+        get(READ, "/v1/jobs/{id}/description", (ID,), get_job_description)
+            .rpcs(&["GetJobDescription"])
+            .summary("Returns the problem of a job in words")
+            .answers(200, "The description", json::<Description>()),
         get(READ, "/v1/jobs/{id}/events", (ID, AFTER_SEQ, Header(LAST_EVENT_ID)), events::events)
             .rpcs(&["WatchJob"])
             .summary("Streams the events of a job, past ones first, then live ones, until `done`")
             .answers(200, "The events, each with its number; a comment every 15 s", [stream::<Event>(), lines()].concat())
             .answers(204, "The job has ended, and there are no events after that number", nothing())
+            .fails(&[Code::NotAcceptable, Code::Draining]),
+        get(READ, "/v1/events", (FILTERS, FIELDS, AFTER, Header(LAST_LIST_EVENT_ID)), events::list_events)
+            .rpcs(&["WatchJobs"])
+            .summary("Streams what happens to the jobs that match the filters: accepted, changed or removed jobs, their progress at most twice a second, rows of sweeps, counts, the queue. `reset` says that the list is to be read again, as after a restart of the service")
+            .answers(200, "The events; the last of those that belong together has an id; a comment every 15 s", [stream::<ListPayload>(), lines()].concat())
             .fails(&[Code::NotAcceptable, Code::Draining]),
         patch(SUBMIT, "/v1/jobs/{id}", (ID, IF_MATCH), update_job)
             .rpcs(&["UpdateJob"])
@@ -158,21 +173,26 @@ async fn get_job(
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "JobList")]
 struct List {
-    jobs: Vec<Job>,
+    /// The jobs, with the fields that were asked for.
+    #[schemars(with = "Vec<Job>")]
+    jobs: Vec<JobRow>,
     next_page_token: Option<String>,
 }
 
 async fn list_jobs(
     call: Call,
     filter: Filter,
+    fields: Option<BTreeSet<&'static str>>,
     size: Option<i64>,
     token: Option<String>,
     order: Option<Order>,
 ) -> Result<Json<List>, ApiError> {
     let paging = Paging { size, token };
     let page = lists::list(&call.service, &call.caller, &filter, order, &paging).await?;
+    let fields = fields.map(Arc::new);
+    let rows = page.items.into_iter().map(|job| row(job, fields.as_ref()));
     Ok(Json(List {
-        jobs: page.items,
+        jobs: rows.collect(),
         next_page_token: page.next,
     }))
 }
@@ -201,7 +221,7 @@ struct JobTable {
 async fn list_job_table(
     call: Call,
     filter: Filter,
-    columns: Option<Columns>,
+    (columns, differing): (Option<Columns>, Option<bool>),
     format: Format,
     partial: Option<bool>,
     size: Option<i64>,
@@ -215,6 +235,7 @@ async fn list_job_table(
         paging: Paging { size, token },
         columns,
         partial: partial.unwrap_or_default(),
+        differing: differing.unwrap_or_default(),
     };
     let (table, next) = job_table::table(&call.service, &call.caller, request).await?;
     let token = next.clone();
@@ -257,6 +278,18 @@ async fn count_jobs(
 
 async fn get_job_problem(call: Call, id: JobId) -> Result<Json<Problem>, ApiError> {
     Ok(Json(verbs::problem(&call.service, &call.caller, id).await?))
+}
+
+/// A problem in words.
+#[derive(Serialize, JsonSchema)]
+struct Description {
+    /// A few sentences.
+    description: String,
+}
+
+async fn get_job_description(call: Call, id: JobId) -> Result<Json<Description>, ApiError> {
+    let description = views::description(&call.service, &call.caller, id).await?;
+    Ok(Json(Description { description }))
 }
 
 async fn update_job(

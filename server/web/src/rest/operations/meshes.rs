@@ -10,9 +10,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use service::{
     error::ApiError,
+    formats::Format,
     verbs::{
         meshes::{self as verbs, HASH},
         page::{PAGE_SIZE, PAGE_TOKEN, Paging},
+        views,
     },
 };
 
@@ -25,6 +27,7 @@ use crate::rest::{
     body::{declared_length, discard},
     call::Call,
     coding,
+    data::{self, PART, Part},
 };
 
 pub(super) fn operations() -> Vec<Operation> {
@@ -47,6 +50,11 @@ pub(super) fn operations() -> Vec<Operation> {
             .rpcs(&["GetMesh"])
             .summary("Returns the size, names and quality of a stored mesh")
             .answers(200, "The mesh, without its nodes and elements", json::<MeshInfo>()),
+        get(READ, "/v1/meshes/{hash}/view", (HASH, PART), get_mesh_view)
+            .rpcs(&["StreamView"])
+            .named("GetMeshView")
+            .summary("Returns what a program needs to draw a stored mesh, as compact arrays (see docs/how-to/formats.md)")
+            .file("The view", bytes(Format::View.media_type())),
         delete(CANCEL, "/v1/meshes/{hash}", (HASH,), delete_mesh)
             .rpcs(&["DeleteMesh"])
             .summary("Deletes a stored mesh that no waiting or running job needs")
@@ -78,6 +86,11 @@ async fn upload_mesh(call: Call) -> Result<Response, ApiError> {
 
 async fn get_mesh(call: Call, hash: String) -> Result<Json<MeshInfo>, ApiError> {
     Ok(Json(verbs::get(&call.service, &call.caller, &hash).await?))
+}
+
+async fn get_mesh_view(call: Call, hash: String, part: Part) -> Result<Response, ApiError> {
+    let content = views::of_mesh(&call.service, &call.caller, &hash).await?;
+    data::whole(&part, Format::View, "mesh".into(), content)
 }
 
 /// A page of meshes.

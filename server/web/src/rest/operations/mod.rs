@@ -14,6 +14,7 @@ mod operation;
 // The groups: entries, and their handlers.
 mod jobs;
 mod meshes;
+mod problems;
 mod results;
 mod service;
 mod submit;
@@ -31,7 +32,7 @@ use super::call::AppState;
 pub(super) const DESCRIPTION: Access = operation::READ;
 
 /// The groups in the order in which they are documented: name, subject and operations.
-pub(super) const GROUPS: [Group; 6] = [
+pub(super) const GROUPS: [Group; 7] = [
     ("jobs", "Submit, get, list, watch, cancel", || {
         submit::operations()
             .into_iter()
@@ -46,10 +47,11 @@ pub(super) const GROUPS: [Group; 6] = [
     ),
     ("meshes", "Stored once, for many jobs", meshes::operations),
     (
-        "service",
-        "Checking a problem without a job, and the service itself",
-        service::operations,
+        "problems",
+        "Checking, drawing and converting a problem without a job; examples",
+        problems::operations,
     ),
+    ("service", "The service itself", service::operations),
     (
         "tokens",
         "Who may use the service; for administrators",
@@ -115,6 +117,8 @@ mod tests {
             "/v1/jobs/{id}/plots/{plot}",
             "/v1/jobs/table",
             "/",
+            "/v1/session",
+            "/v1/session",
             "/docs",
             "/docs/{file}",
             "/openapi.json",

@@ -6,7 +6,8 @@ use axum::{
     http::{StatusCode, header::CONTENT_TYPE},
     response::Response,
 };
-use base::{catalog::Code, event::TimedIteration, job::JobId};
+use base::{catalog::Code, event::HistoryRow, job::JobId};
+use files::plot::ViewField;
 use service::{
     error::ApiError,
     formats::{self, Format},
@@ -18,6 +19,7 @@ use service::{
         plots::PLOT,
         profiles::{self, BOUNDARY, POINTS, Points, STEP},
         results::{self, JobResult, PARTIAL},
+        views::{self, FIELD},
     },
 };
 use solver::solution::{ContactProfile, Fields};
@@ -53,7 +55,7 @@ pub(super) fn operations() -> Vec<Operation> {
         )
         .rpcs(&["ListIterations"])
         .summary("Returns the iterations of a job's last attempt, one row each")
-        .file_of_result("The rows", data::<Vec<TimedIteration>>(Format::OF_TABLES))
+        .file_of_result("The rows", data::<Vec<HistoryRow>>(Format::OF_TABLES))
         .fails(&[Code::PartialResult]),
         get(
             READ,
@@ -77,6 +79,18 @@ pub(super) fn operations() -> Vec<Operation> {
         .file_of_result("The fields", data::<Fields>(Format::OF_FIELDS))
         .fails(NO_RESULT)
         .fails(&[Code::PartialResult]),
+        get(READ, "/v1/jobs/{id}/view", (ID, PARTIAL, PART), get_view)
+            .rpcs(&["StreamView"])
+            .named("GetJobView")
+            .summary("Returns what a program needs to draw the body of a job: corners of elements, outline, boundaries, supports, loads and obstacles, as compact arrays (see docs/how-to/formats.md); of the problem's mesh until there is a result")
+            .file_of_result("The view", bytes(Format::View.media_type())),
+        get(READ, "/v1/jobs/{id}/view/{field}", (ID, FIELD, PARTIAL, PART), get_field_view)
+            .rpcs(&["StreamView"])
+            .named("GetJobFieldView")
+            .summary("Returns one field of a job's result at the corners of its view")
+            .file_of_result("The field", bytes(Format::View.media_type()))
+            .fails(NO_RESULT)
+            .fails(&[Code::PartialResult]),
         delete(CANCEL, "/v1/jobs/{id}/fields", (ID,), delete_fields)
             .rpcs(&["DeleteFields"])
             .summary("Deletes mesh, displacements and stresses of a job that has ended, which are most of its data; summary, history and profiles remain")
@@ -212,6 +226,48 @@ async fn get_profile(
     Ok(marked(whole, available))
 }
 
+async fn get_view(
+    call: Call,
+    id: JobId,
+    partial: Option<bool>,
+    part: Part,
+) -> Result<Response, ApiError> {
+    let (service, caller, partial) = (&call.service, &call.caller, partial.unwrap_or_default());
+    let job = jobs::get(service, caller, id).await?;
+    let tag = views::tag_of(&job, &format!("view {partial}"));
+    if let Some(known) = part.known(tag.as_deref()) {
+        return Ok(marked(known, job.result_available));
+    }
+    let found = views::of_job(service, caller, id, partial).await?;
+    let whole = data::tagged(
+        &part,
+        Format::View,
+        format!("{id}.view"),
+        found.content,
+        tag,
+    )?;
+    Ok(marked(whole, found.available))
+}
+
+async fn get_field_view(
+    call: Call,
+    id: JobId,
+    field: ViewField,
+    partial: Option<bool>,
+    part: Part,
+) -> Result<Response, ApiError> {
+    let (service, caller, partial) = (&call.service, &call.caller, partial.unwrap_or_default());
+    let job = jobs::get(service, caller, id).await?;
+    let tag = views::tag_of(&job, &format!("view {field:?} {partial}"));
+    if let Some(known) = part.known(tag.as_deref()) {
+        return Ok(marked(known, job.result_available));
+    }
+    let found = views::field_of_job(service, caller, id, field, partial).await?;
+    let name = format!("{id}.{}", <&str>::from(field));
+    let whole = data::tagged(&part, Format::View, name, found.content, tag)?;
+    Ok(marked(whole, found.available))
+}
+
 async fn delete_fields(call: Call, id: JobId) -> Result<StatusCode, ApiError> {
     jobs::delete_fields(&call.service, &call.caller, id).await?;
     Ok(StatusCode::NO_CONTENT)
@@ -229,8 +285,13 @@ async fn stream_result(
     } = &call;
     let (name, partial) = (format!("{id}.fields"), partial.unwrap_or_default());
     if format != Format::Json {
+        let job = jobs::get(service, caller, id).await?;
+        let tag = views::tag_of(&job, &format!("fields {format:?} {partial}"));
+        if let Some(known) = part.known(tag.as_deref()) {
+            return Ok(marked(known, job.result_available));
+        }
         let found = stored::converted_fields(service, caller, id, format, partial).await?;
-        let whole = data::whole(&part, format, name, found.content)?;
+        let whole = data::tagged(&part, format, name, found.content, tag)?;
         return Ok(marked(whole, found.available));
     }
     // JSON may be large, and is sent in pieces
@@ -241,6 +302,7 @@ async fn stream_result(
         name,
         bytes: fields.info.bytes,
         digest: fields.info.digest.clone(),
+        tag: None,
     };
     let answer = data::answer(&part, &file, |range| {
         Body::from_stream(fields.bytes(service, range.start, range.end))

@@ -1,4 +1,4 @@
-//! The operations for checking a problem, the queue, errors, the description of the API, and the probes.
+//! The operations for the queue, errors, the description of the API, the page, and the probes.
 
 use axum::{
     Json,
@@ -15,41 +15,38 @@ use serde::Serialize;
 use serde_json::Value;
 use service::{
     error::ApiError,
-    parameters::Variable,
+    parameters::{Parameter, Variable},
     verbs::{
         info::{self as about, Info, Me, OwnerUse},
         metrics::metrics as all_metrics,
-        problems::{self, Validation},
-        queue::{self as verbs, QueueState},
+        queue::{self as verbs, Forecast, QueueState},
     },
 };
 use solver::solution::WarningCode;
 
 use super::{
-    content::{bytes, json, submission},
-    operation::{ADMIN, IDENTIFIED, OPEN, Operation, READ, SUBMIT, get, post, probe},
+    content::{bytes, json, nothing},
+    operation::{ADMIN, IDENTIFIED, OPEN, Operation, READ, delete, get, post, probe},
 };
 use crate::rest::{
     accept::{accepted, prefers, weight},
-    bodies::{self, BareProblem},
+    bodies::LogIn,
     call::Call,
     docs::{self, FILE},
-    home,
+    page,
+    session::{self, Session},
 };
 
 pub(super) fn operations() -> Vec<Operation> {
     vec![
-        post(SUBMIT, "/v1/problems/validate", (), validate_problem)
-            .rpcs(&["ValidateProblem"])
-            .summary("Checks a problem and estimates its cost; stores nothing; an invalid problem is also answered with 200")
-            .body(json::<BareProblem>())
-            .example(submission())
-            .answers(200, "Whether the problem is valid, and its estimated cost", json::<Validation>())
-            .fails(&[Code::InvalidProblem]),
         get(READ, "/v1/queue", (), get_queue)
             .rpcs(&["GetQueue"])
             .summary("Returns the state of the queue")
             .answers(200, "Its state", json::<QueueState>()),
+        get(READ, "/v1/queue/waiting", (), list_waiting)
+            .rpcs(&["ListWaiting"])
+            .summary("Returns the waiting jobs, why each waits and in how many seconds it may start, and the load of the last hour")
+            .answers(200, "The waiting jobs and the load", json::<Forecast>()),
         post(ADMIN, "/v1/queue/pause", (), pause_queue)
             .rpcs(&["PauseQueue"])
             .summary("Pauses the queue: no more jobs are started until it is resumed, also after a restart; running jobs continue")
@@ -92,10 +89,21 @@ pub(super) fn operations() -> Vec<Operation> {
             .rest_only("GetProto")
             .summary("Returns the description of the API over gRPC")
             .answers(200, "The protocol buffers", bytes("text/plain")),
-        get(READ, "/", (), home::page)
+        get(OPEN, "/", (PAGE_QUERY,), page::page)
             .rest_only("GetHome")
-            .summary("Shows the last jobs with their verdicts and figures, to a person with a browser")
+            .summary("Shows the page for people: jobs, results, new problems, the queue. It has no data of its own, and works offline")
             .answers(200, "The page", bytes("text/html")),
+        post(OPEN, "/v1/session", (), session::create_session)
+            .rest_only("CreateSession")
+            .summary("Begins a session of a browser: a token becomes a cookie that scripts cannot read, for at most 12 hours. A form is answered with the page")
+            .body([json::<LogIn>(), bytes("application/x-www-form-urlencoded")].concat())
+            .answers(201, "The session, with its cookie", json::<Session>())
+            .answers(303, "The page, after a form was sent", nothing())
+            .fails(&[Code::Unauthenticated, Code::InvalidProblem]),
+        delete(OPEN, "/v1/session", (), session::delete_session)
+            .rest_only("DeleteSession")
+            .summary("Ends the session of a browser; its token remains valid")
+            .answers(204, "The cookie is removed", nothing()),
         get(READ, "/docs", (), docs::page)
             .rest_only("GetDocs")
             .summary("Shows a page with this description, on which requests can be tried out; it works offline")
@@ -121,21 +129,22 @@ pub(super) fn operations() -> Vec<Operation> {
     ]
 }
 
+/// What the address of the page says after a log-in that failed.
+const PAGE_QUERY: Parameter<Words<()>> = Parameter {
+    name: "login",
+    meaning: "Whether a log-in has failed, for the page itself",
+    values: Words(|| vec![("failed", ())]),
+};
+
 /// The media types of the files that the page at `/docs` loads.
 const PARTS: [&str; 3] = ["text/css", "text/javascript", "text/plain"];
 
-async fn validate_problem(mut call: Call) -> Result<Json<Validation>, ApiError> {
-    let text = call.json().await?;
-    let problem = call
-        .service
-        .work(move || bodies::bare_problem(&text))
-        .await??;
-    let validation = problems::validate(&call.service, &call.caller, problem).await?;
-    Ok(Json(validation))
-}
-
 async fn get_queue(call: Call) -> Result<Json<QueueState>, ApiError> {
     Ok(Json(verbs::state(&call.service, &call.caller)))
+}
+
+async fn list_waiting(call: Call) -> Result<Json<Forecast>, ApiError> {
+    Ok(Json(verbs::waiting(&call.service, &call.caller).await?))
 }
 
 async fn pause_queue(call: Call) -> Result<Json<QueueState>, ApiError> {

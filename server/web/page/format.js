@@ -1,0 +1,169 @@
+/** Numbers, times and sizes as people read them. */
+
+const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+
+/** @param {number} power */
+export function powerOfTen(power) {
+  const digits = String(Math.abs(power)).replace(/\d/g, (digit) => SUPERSCRIPTS[Number(digit)] ?? digit);
+  return `10${power < 0 ? "⁻" : ""}${digits}`;
+}
+
+/** @param {string} text with the hyphen as minus sign */
+const withMinus = (text) => text.replace("-", "−");
+
+/** @param {string} text */
+const withoutZeros = (text) => (text.includes(".") ? text.replace(/\.?0+$/, "") : text);
+
+/**
+ * A number with at most so many digits; very large and very small ones with a power of ten.
+ * @param {number | null | undefined} value
+ * @param {number} [digits]
+ */
+export function number(value, digits = 5) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "—";
+  if (value === 0) return "0";
+  const power = Math.floor(Math.log10(Math.abs(value)));
+  if (power >= 6 || power < -4) {
+    const [digitsOf, of] = value.toExponential(Math.max(digits - 2, 0)).split("e");
+    return `${withMinus(withoutZeros(digitsOf ?? ""))} · ${powerOfTen(Number(of))}`;
+  }
+  return withMinus(withoutZeros(value.toFixed(Math.max(0, digits - 1 - power))));
+}
+
+/**
+ * A number and its error, both with as many decimals as the two first digits of the error have.
+ * @param {number} value
+ * @param {number | null | undefined} error
+ * @returns {[string, string]}
+ */
+export function withError(value, error) {
+  if (error === null || error === undefined || !(error > 0)) {
+    return [number(value), error === 0 ? "0" : "—"];
+  }
+  const power = Math.floor(Math.log10(error));
+  const size = Math.max(Math.abs(value), error);
+  if (size >= 1e6 || power < -6) return [number(value, 4), number(error, 2)];
+  const decimals = Math.min(12, Math.max(0, 1 - power));
+  return [withMinus(value.toFixed(decimals)), error.toFixed(decimals)];
+}
+
+/** @param {number | null | undefined} part */
+export function percent(part) {
+  if (part === null || part === undefined || !Number.isFinite(part)) return "—";
+  const value = 100 * part;
+  if (value > 100) return "> 100 %";
+  return `${value === 0 ? "0" : value < 0.01 ? "< 0.01" : value.toFixed(value < 10 ? 2 : 0)} %`;
+}
+
+/** @param {number | null | undefined} seconds */
+export function duration(seconds) {
+  if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "";
+  if (seconds < 0.001) return "< 1 ms";
+  if (seconds < 1) return `${Number((seconds * 1000).toPrecision(2))} ms`;
+  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  if (seconds < 60) return `${Math.round(seconds)} s`;
+  const minutes = Math.floor(seconds / 60);
+  if (minutes < 60) return `${minutes} min ${Math.round(seconds % 60)} s`;
+  const hours = Math.floor(minutes / 60);
+  if (hours < 48) return `${hours} h ${minutes % 60} min`;
+  return `${Math.floor(hours / 24)} days`;
+}
+
+/**
+ * How long ago a time was, roughly.
+ * @param {string | null | undefined} time as RFC 3339
+ * @param {number} [now] milliseconds
+ */
+export function ago(time, now = Date.now()) {
+  if (!time) return "";
+  const seconds = Math.max(0, (now - Date.parse(time)) / 1000);
+  if (seconds < 5) return "now";
+  if (seconds < 60) return `${Math.floor(seconds / 5) * 5} s`;
+  if (seconds < 3600) return `${Math.floor(seconds / 60)} min`;
+  if (seconds < 48 * 3600) return `${Math.floor(seconds / 3600)} h`;
+  return `${Math.floor(seconds / 86400)} days`;
+}
+
+/**
+ * A time as the person's own clock shows it.
+ * @param {string | null | undefined} time as RFC 3339
+ */
+export const exactly = (time) => (time ? new Date(time).toLocaleString() : "");
+
+/** @param {number | null | undefined} count */
+export function bytes(count) {
+  if (count === null || count === undefined) return "—";
+  const units = ["B", "kB", "MB", "GB", "TB"];
+  let place = 0;
+  let value = count;
+  while (value >= 1000 && place < units.length - 1) {
+    value /= 1000;
+    place += 1;
+  }
+  return `${place === 0 ? value : Number(value.toPrecision(3))} ${units[place]}`;
+}
+
+/** @param {number} count */
+export const count = (count) => count.toLocaleString("en").replaceAll(",", " ");
+
+/**
+ * A count with its noun.
+ * @param {number} number
+ * @param {string} noun in the singular
+ */
+export const counted = (number, noun) => `${count(number)} ${noun}${number === 1 ? "" : "s"}`;
+
+/** @type {Record<string, string>} */
+const QUANTITIES = {
+  normal_force: "normal force",
+  tangential_force: "tangential force",
+  friction_force: "friction force",
+  peak_normal_stress: "largest pressure, as σₙ",
+  peak_tangential_stress: "largest σₜ",
+  contact_start: "contact begins at s",
+  contact_end: "contact ends at s",
+  stick_end: "stick ends at s",
+  indentation: "indentation",
+  tangential_displacement: "tangential displacement",
+  tilt: "tilt (rad)",
+};
+
+/** @param {string} name of a quantity */
+export const quantity = (name) => QUANTITIES[name] ?? words(name);
+
+/** @param {string} code */
+export const words = (code) => code.replaceAll("_", " ").replaceAll("-", " ");
+
+/** @type {Record<string, string>} */
+const WAITING = {
+  workers_busy: "all workers are busy",
+  memory: "the running jobs leave too little memory",
+  paused: "the queue is paused",
+  low_disk: "the disk is full",
+  owner_limit: "you have as many running jobs as you may",
+  coalesced: "another job has the same input, and its result is awaited",
+};
+
+/**
+ * Why a job waits, in words.
+ * @param {import("./types").QueuePosition | null | undefined} queue
+ */
+export function waits(queue) {
+  if (!queue) return "waits";
+  const why = WAITING[queue.reason] ?? words(queue.reason);
+  if (queue.position <= 0) return why;
+  return `${ordinal(queue.position)} in line: ${why}`;
+}
+
+/** @param {number} place */
+function ordinal(place) {
+  const teen = place % 100 >= 11 && place % 100 <= 13;
+  const ending = teen ? "th" : ({ 1: "st", 2: "nd", 3: "rd" }[place % 10] ?? "th");
+  return `${count(place)}${ending}`;
+}
+
+/**
+ * A text with a capital letter at its beginning and a full stop at its end.
+ * @param {string} text
+ */
+export const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.!?]$/.test(text) ? "" : ".");
