@@ -11,6 +11,7 @@ import os
 import pathlib
 import re
 import signal
+import socket
 import ssl
 import subprocess
 import sys
@@ -147,9 +148,10 @@ def note(**figures):
 class Server:
     """The real binary on a free port with a store of its own, which outlives a kill."""
 
-    def __init__(self, *options, wrapper=(), ca=None):
-        """`ca`: the authority whose certificate it shows, if the options have it speak TLS."""
-        self.options, self.wrapper, self.ca = options, wrapper, ca
+    def __init__(self, *options, wrapper=(), ca=None, port=0, binary=BINARY):
+        """`ca`: the authority whose certificate it shows, if the options have it speak TLS. `port`: for one that clients find again
+        after a restart."""
+        self.options, self.wrapper, self.ca, self.port, self.binary = options, wrapper, ca, port, binary
         self.folder = tempfile.TemporaryDirectory()
         self.data = pathlib.Path(self.folder.name) / "data"
         self.log = pathlib.Path(self.folder.name) / "log"
@@ -169,7 +171,7 @@ class Server:
     def start(self):
         """Starts it, and returns the seconds until it is ready."""
         began = time.monotonic()
-        command = [*self.wrapper, BINARY, "serve", "--listen", "127.0.0.1:0", "--data", self.data, *self.options]
+        command = [*self.wrapper, self.binary, "serve", "--listen", "127.0.0.1:%d" % self.port, "--data", self.data, *self.options]
         with self.open_log() as log:
             self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log)
         self.url = self.process.stdout.readline().decode().strip()
@@ -258,6 +260,12 @@ class Server:
             filters["page_token"] = page["next_page_token"]
             if not filters["page_token"]:
                 return jobs
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
 
 class Lost(Exception):

@@ -3,7 +3,7 @@
     tests/generators/run.py [NAME ...]      openapi-python-client, openapi-generator (Python, TypeScript),
                                             openapi-typescript; by default all of these; progenitor (Rust) by its name
 
-progenitor is a step of its own, of `tests/run --all` alone, since it and its client take minutes to compile. Version 0.15 stops where an operation
+progenitor is run by `tests/soak progenitor`, since it and its client take minutes to compile. Version 0.15 stops where an operation
 has answers of success of two types (200 with data, 206 with a part of the file or 204 without) or a body of two media types.
 `one_answer_each` leaves it one of each; a description without the others would hide them from all other clients.
 

@@ -35,12 +35,6 @@ LATE_S = 0.5
 PREFIX = "/signorini"
 
 
-def free_port():
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
-
-
 def replaced(name, pairs):
     text = (TOP / "contrib" / name).read_text()
     for old, new in pairs:

@@ -122,5 +122,5 @@ ROWS = [
     Row("R34", "The same problem has the same digest, on any thread, after a restart, from the cache",
         missing="tested for a few problems in the unit and service tests; not a hundred times"),
     Row("G9", "Over all these attacks no server takes more memory than the budget of its jobs and 256 MiB", "peaks.py", "peaks.py --soak"),
-    Row("R35", "A page in a browser re-attaches after a restart", missing="there is no page yet"),
+    Row("R35", "A page in a browser re-attaches after a restart", "page.py", "page.py", needs=("chromium",)),
 ]
