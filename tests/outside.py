@@ -148,10 +148,10 @@ def note(**figures):
 class Server:
     """The real binary on a free port with a store of its own, which outlives a kill."""
 
-    def __init__(self, *options, wrapper=(), ca=None, port=0, binary=BINARY):
+    def __init__(self, *options, wrapper=(), ca=None, port=0):
         """`ca`: the authority whose certificate it shows, if the options have it speak TLS. `port`: for one that clients find again
         after a restart."""
-        self.options, self.wrapper, self.ca, self.port, self.binary = options, wrapper, ca, port, binary
+        self.options, self.wrapper, self.ca, self.port = options, wrapper, ca, port
         self.folder = tempfile.TemporaryDirectory()
         self.data = pathlib.Path(self.folder.name) / "data"
         self.log = pathlib.Path(self.folder.name) / "log"
@@ -171,7 +171,7 @@ class Server:
     def start(self):
         """Starts it, and returns the seconds until it is ready."""
         began = time.monotonic()
-        command = [*self.wrapper, self.binary, "serve", "--listen", "127.0.0.1:%d" % self.port, "--data", self.data, *self.options]
+        command = [*self.wrapper, BINARY, "serve", "--listen", "127.0.0.1:%d" % self.port, "--data", self.data, *self.options]
         with self.open_log() as log:
             self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log)
         self.url = self.process.stdout.readline().decode().strip()

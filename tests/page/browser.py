@@ -68,7 +68,7 @@ class Watched:
 
     def has_only_asked_the_service(self):
         home = self.server.url + "/"
-        others = [url for url in self.asked if not url.startswith((home, "data:", "blob:" + home))]
+        others = [url for url in self.asked if not (url + "/").startswith(home) and not url.startswith(("data:", "blob:" + home))]
         equal(others, [], "addresses of others that the page has asked")
         own = [found for found in self.messages if found[0] in ("error", "warning", "exception") and not OF_THE_BROWSER.search(found[1])]
         equal(own, [], "messages of the page's own in the console")

@@ -62,8 +62,8 @@ def run(browser):
             settled(page)
             equal(page.evaluate("[typeof hit, document.querySelectorAll('img, script:not([src])').length]"), ["undefined", 0],
                   "script or markup at " + address)
-        for link in page.evaluate("[...document.querySelectorAll('a')].map((a) => a.href)"):
-            check(not link.startswith("javascript:"), "a link " + link)
+            for link in page.evaluate("[...document.querySelectorAll('a')].map((a) => a.href)"):
+                check(not link.startswith("javascript:"), "a link at %s: %s" % (address, link))
 
         # what is wrong is told with what was given
         page.goto(server.url + "/#/new?from=" + jobs[0])

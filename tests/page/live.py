@@ -84,6 +84,8 @@ def killed(browser):
         page.get_by_role("heading", name="Numbers").wait_for()
         events = [event["seq"] for event in server.events(job)]
         ids = page.evaluate("ids")
+        asked = [int(url.rsplit("after_seq=", 1)[1]) for url in tabs.asked if "/events?after_seq=" in url]
+        equal(ids[0], min(asked) + 1, "the first event of the stream follows the history")
         equal(ids, list(range(ids[0], events[-1] + 1)), "the ids of the events that the page has received")
         # read again, the page shows the same
         page.reload()
@@ -108,13 +110,14 @@ def submitted_and_watched(browser):
         page.locator("table.jobs tbody tr").wait_for()
 
         # steps of a long load are shown while it goes on
-        job = server.submit(stepped(20, 30, refine=3), name="long")
+        job = server.submit(stepped(60, 100, refine=5), name="long")
         page.get_by_text("1 new").click()
         page.get_by_role("link", name="long").click()
         page.get_by_text("so far").wait_for(timeout=60_000)
         page.locator("#normal-stress canvas").wait_for()
-        page.get_by_role("button", name="Stop").click()
-        page.get_by_text("was stopped before it was solved").wait_for()
+        page.once("dialog", lambda dialog: dialog.accept())
+        page.get_by_role("button", name="Cancel").click()
+        page.get_by_text("was canceled before it was solved").wait_for()
         equal(server.finished(job)["status"], "canceled", "the job")
 
 

@@ -37,9 +37,9 @@ def views(browser, scheme):
             settled(page)
             page.wait_for_timeout(1500)
             take(page, "%s-%s" % (name, scheme))
-        job = server.submit(stepped(20, 40, refine=3), name="a long load")
+        job = server.submit(stepped(60, 100, refine=5), name="a long load")
         for number in range(4):
-            server.submit(talkative(300, refine=3), name="waits %d" % number)
+            server.submit(talkative(900, refine=3), name="waits %d" % number)
         page.goto(server.url + "/#/jobs/" + job)
         page.get_by_text("so far").wait_for(timeout=60_000)
         page.wait_for_timeout(1000)

@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 import time
 
-from outside import BINARY, Server, check, equal, example, free_port, talkative
+from outside import Server, check, equal, example, free_port, talkative
 from browser import described, until
 
 
@@ -32,27 +32,27 @@ def twelve_tabs(browser):
             until("every tab is told of the end", lambda page=page: "succeeded" in page.inner_text("main"), 40)
 
 
-def another_version(folder, home):
-    """The program with another digest of the page, as a later version has. `home`: the answer with the page."""
-    program = pathlib.Path(BINARY).read_bytes()
-    digest = re.search(rb"web/([0-9a-f]+)/app\.js", home.body)[1]
-    check(digest in program, "the program has %r" % digest)
-    other = bytes(b"0123456789abcdef"[(b"0123456789abcdef".index(digit) + 1) % 16] for digit in digest)
-    path = folder / "signorini"
-    path.write_bytes(program.replace(digest, other))
-    path.chmod(0o755)
-    return path
+def later_version(context, server):
+    """From now on the browser meets a later version of the page at the same service: its page names other files, and the files
+    of the version before are gone."""
+    home = server.call("GET", "/")
+    before = re.search(rb"web/([0-9a-f]+)/app\.js", home.body)[1].decode()
+    later = before[::-1]
+    headers = {name: home.headers[name] for name in ("content-type", "content-security-policy", "cache-control")}
+    files = "%s/web/%%s/**" % server.url
+    context.route(server.url + "/", lambda route: route.fulfill(body=home.body.decode().replace(before, later), headers=headers))
+    context.route(files % before, lambda route: route.fulfill(status=404, body="{}", content_type="application/problem+json"))
+    context.route(files % later, lambda route: route.fulfill(response=route.fetch(url=route.request.url.replace(later, before))))
 
 
 def updated(browser):
     """An open tab goes on after an update; what it has not loaded yet is asked for by a reload, and not half shown."""
-    with tempfile.TemporaryDirectory() as folder, Server(port=free_port()) as server, browser.at(server) as tabs:
+    with Server(port=free_port()) as server, browser.at(server) as tabs:
         server.finished(server.submit(example("sheet"), name="of before"))
         page = tabs.page("#/jobs", "of before")
-        later = another_version(pathlib.Path(folder), server.call("GET", "/"))
         server.stop()
-        server.binary = later
         server.start()
+        later_version(tabs.context, server)
         job = server.submit(example("sheet"), name="of after")
         page.get_by_role("link", name="of after").or_(page.get_by_text("1 new")).first.wait_for(timeout=40_000)
         page.get_by_role("link", name="Queue").click()

@@ -101,6 +101,11 @@ async fn a_browser_asks_for_a_password_when_a_person_opens_an_address() {
     assert_eq!(asked("cors").await, ["Beare"]);
     let with = server.get("/docs").basic_auth("anybody", Some(token));
     assert_eq!(with.send().await.unwrap().status(), StatusCode::OK);
+    // explanations are read by people, who follow a link from the page
+    let why = server.get("/v1/warnings/sharp_edge");
+    let why = why.header("Accept", "text/html,*/*;q=0.8").send().await;
+    let why = why.unwrap().text().await.unwrap();
+    assert!(why.starts_with("<!doctype html>") && why.contains("<code>sharp_edge</code>"));
     // what is answered is for the one who asked, and for no other site
     let answer = server.get("/v1/errors/not-found").send().await.unwrap();
     assert_eq!(answer.headers()["cache-control"], "private, no-cache");

@@ -177,9 +177,11 @@ impl Store {
         self.read_list(move |store, connection| {
             let keys = serde_json::to_string(&keys)?;
             let mut query = Query::default();
-            query.push("select job.* from job where job.id in (select value from json_each(");
-            query.push_value(keys).push("))");
-            conditions(&mut query, &filter, None, OrderBy::CreatedAt);
+            // each by its key: by the index of an owner, or of a label, all of their jobs would be read
+            query.push("select job.* from json_each(");
+            query.push_value(keys);
+            query.push(") as wanted cross join job on job.id = wanted.value where true");
+            conditions(&mut query, &filter, Some(Lane::All), OrderBy::CreatedAt);
             let window = Window {
                 after: None,
                 last: None,

@@ -69,11 +69,15 @@ export const pauseBefore = (attempt) => Math.min(LONGEST_PAUSE, 500 * 2 ** attem
 export function sleep(ms, signal) {
   return new Promise((resolve, reject) => {
     if (signal?.aborted) return reject(signal.reason);
-    const timer = setTimeout(resolve, ms);
-    signal?.addEventListener("abort", () => {
+    const stop = () => {
       clearTimeout(timer);
-      reject(signal.reason);
-    });
+      reject(signal?.reason);
+    };
+    const timer = setTimeout(() => {
+      signal?.removeEventListener("abort", stop);
+      resolve();
+    }, ms);
+    signal?.addEventListener("abort", stop, { once: true });
   });
 }
 
@@ -120,9 +124,16 @@ async function isOurs(response) {
  * @returns {Promise<T>}
  */
 export async function get(path, signal) {
-  const response = await request(path, { signal: signal ?? null, headers: { accept: "application/json" } });
+  // the entity tag of a job names its version, which progress and partial results do not change
+  const response = await request(path, { signal: signal ?? null, cache: "no-store", headers: { accept: "application/json" } });
   return response.json();
 }
+
+/**
+ * Whether the same request may be answered later: the service is away, overloaded, or had a fault of its own.
+ * @param {unknown} error
+ */
+export const isPassing = (error) => error instanceof Unreachable || (error instanceof ApiError && (error.status === 429 || error.status === 503));
 
 /**
  * Gets JSON, and tries again while the service cannot be reached.
@@ -136,7 +147,7 @@ export async function getSurely(path, signal) {
     try {
       return await get(path, signal);
     } catch (error) {
-      if (!(error instanceof Unreachable)) throw error;
+      if (!isPassing(error)) throw error;
     }
     await sleep(pauseBefore(attempt), signal);
   }

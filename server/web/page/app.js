@@ -38,6 +38,9 @@ const VIEWS = {
   queue: () => import("./views/queue.js"),
 };
 
+/** How often it is looked whether the session is still valid (ms). */
+const LOOK = 10_000;
+
 /** The scopes that views need. @type {Record<string, string>} */
 const NEEDED = { new: "submit" };
 
@@ -63,6 +66,8 @@ async function start() {
   });
   addEventListener("hashchange", show);
   setInterval(() => connection.lostAt !== null && draw(), 1000);
+  // a view that has read all it shows asks nothing more, and would not be told that its session has ended
+  setInterval(() => state.me && !state.needsToken && !document.hidden && request("v1/me", { cache: "no-store" }).catch(() => undefined), LOOK);
   document.addEventListener("keydown", shortcut);
   draw();
   try {
@@ -81,7 +86,7 @@ function viewOf(/** @type {import("./route.js").Route} */ { path }) {
   const [first = "", second] = path;
   if (first === "jobs" && second) return "job";
   if (first === "sweeps" && second) return "sweep";
-  return first in VIEWS ? first : "";
+  return Object.hasOwn(VIEWS, first) ? first : "";
 }
 
 async function show() {
@@ -94,13 +99,13 @@ async function show() {
     return;
   }
   state.open?.close();
-  Object.assign(state, { open: null, name: key });
+  Object.assign(state, { open: null, name: key, message: "" });
   draw();
   render(loading("Loading"), place());
   const scope = NEEDED[name];
   if (scope && !app().may(scope)) {
     state.name = "none";
-    render(errorBox(`Your token has no scope "${scope}", which this view needs.`), place());
+    render(errorBox(`Your token has no scope "${scope}": it may look, and not submit. The list of jobs is at Jobs, above.`), place());
     return;
   }
   /** @type {View} */
@@ -128,7 +133,7 @@ function place() {
 /** A module that is not there: the service was updated under the open page, or cannot be reached. */
 async function notLoaded() {
   try {
-    const page = await (await request("./")).text();
+    const page = await (await request("./", { cache: "no-store" })).text();
     const own = import.meta.url.split("/web/")[1]?.split("/")[0] ?? "";
     state.outdated = !page.includes(own);
   } catch {
@@ -209,7 +214,7 @@ function draw() {
           : nothing}
         <span class="space"></span>
         ${drawConnection()}
-        ${me ? drawCaller(me) : nothing}
+        ${me && !state.needsToken ? drawCaller(me) : nothing}
         ${me && app().may("submit") ? html`<a class="button primary" href=${address("new")}>New job</a>` : nothing}
       </header>
       ${state.outdated
@@ -231,7 +236,7 @@ function skip(event) {
 
 function drawConnection() {
   if (connection.lostAt === null) {
-    return state.me ? html`<span class="live" title="What you see is up to date">● live</span>` : nothing;
+    return state.me && !state.needsToken ? html`<span class="live" title="What you see is up to date">● live</span>` : nothing;
   }
   const since = duration((Date.now() - connection.lostAt) / 1000);
   return html`<span class="live lost" role="status">○ no connection since ${since}: what you see may be old</span>`;
@@ -249,8 +254,8 @@ function drawLogIn() {
   const again = state.me !== null;
   return html`<section class="login" aria-labelledby="login-title">
     <h1 id="login-title">${again ? "Your session has ended" : "Log in"}</h1>
-    <p>${again ? "The token was revoked or has expired. " : ""}This service needs a token. An administrator makes one with
-      <code>signorini token create</code>.</p>
+    <p>${again ? "The token was revoked or has expired. " : ""}This service needs a token. An administrator makes one on the page
+      of the queue, or with <code>signorini token create</code>.</p>
     ${state.failed ? html`<p class="box error" role="alert">${state.failed}</p>` : nothing}
     <form method="post" action="v1/session">
       <input type="hidden" name="part" value=${location.hash} />

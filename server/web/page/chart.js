@@ -28,6 +28,7 @@ import { number, powerOfTen } from "./format.js";
  * @property {boolean} [log] whether the vertical axis is logarithmic
  * @property {boolean} [robust] whether the vertical axis leaves out a few values that are far beyond all others
  * @property {(place: number | null) => void} [read] is told which of the common x the pointer or the keyboard is at
+ * @property {[number, number]} [first] the part of the horizontal axis that is shown at first
  * @property {string} [sync] charts with the same word move their pointers together
  */
 
@@ -69,14 +70,33 @@ export function aligned(curves) {
 /**
  * A range that leaves out what is far beyond nearly all values.
  * @param {(number | null)[][]} all
+ * @param {ArrayLike<number>} [x] where the values are
  * @returns {{range: [number, number], cut: boolean}}
  */
-export function robustRange(all) {
-  const values = all.flat().filter((value) => value !== null && Number.isFinite(value));
-  const sorted = /** @type {number[]} */ (values).sort((a, b) => a - b);
-  if (!sorted.length) return { range: [0, 1], cut: false };
-  const at = (/** @type {number} */ part) => sorted[Math.min(sorted.length - 1, Math.floor(part * sorted.length))] ?? 0;
-  const [least, most] = [at(0), at(1)];
+export function robustRange(all, x) {
+  // a value counts by the part of the axis that it stands for: where a mesh is fine there are many
+  /** @type {[number, number][]} */
+  const weighed = [];
+  for (const values of all) {
+    values.forEach((value, n) => {
+      if (value === null || !Number.isFinite(value)) return;
+      const from = x ? (x[Math.max(0, n - 1)] ?? 0) : 0;
+      const to = x ? (x[Math.min(values.length - 1, n + 1)] ?? 0) : 1;
+      weighed.push([value, to - from]);
+    });
+  }
+  weighed.sort((a, b) => a[0] - b[0]);
+  if (!weighed.length) return { range: [0, 1], cut: false };
+  const total = weighed.reduce((sum, [, weight]) => sum + weight, 0);
+  const at = (/** @type {number} */ part) => {
+    let sum = 0;
+    for (const [value, weight] of weighed) {
+      sum += weight;
+      if (sum >= part * total) return value;
+    }
+    return weighed[weighed.length - 1]?.[0] ?? 0;
+  };
+  const [least, most] = [weighed[0]?.[0] ?? 0, weighed[weighed.length - 1]?.[0] ?? 0];
   let [low, high] = [at(0.02), at(0.98)];
   const room = 1.5 * Math.max(high - low, 1e-300);
   low = least < low - room ? low - 0.35 * (high - low) : least;
@@ -175,7 +195,7 @@ export class Chart {
       labelFont: '12px system-ui, "DejaVu Sans", sans-serif',
     };
     const range = (/** @type {any} */ _plot, /** @type {number} */ least, /** @type {number} */ most) => {
-      if (robust) return robustRange(this.data.y).range;
+      if (robust) return robustRange(this.data.y, this.data.x).range;
       if (least === null || most === null) return [0, 1];
       if (log) return [Math.floor(least), Math.max(Math.ceil(most), Math.floor(least) + 1)];
       const margin = 0.08 * (most - least || Math.abs(most) || 1);
@@ -188,7 +208,7 @@ export class Chart {
         legend: { show: false },
         cursor: {
           drag: { x: true, y: false },
-          points: { size: 7 },
+          points: { size: 8, fill: (/** @type {Plot} */ _plot, /** @type {number} */ n) => css(this.curves[n - 1]?.color ?? "--text") },
           ...(this.options.sync ? { sync: { key: this.options.sync } } : {}),
         },
         scales: { x: { time: false }, y: { range } },
@@ -237,6 +257,11 @@ export class Chart {
       this.uplotData(),
       this.root,
     );
+    const { first } = this.options;
+    if (first) {
+      this.plot.setScale("x", { min: first[0], max: first[1] });
+      this.zoomed = true;
+    }
     this.plot.over.addEventListener("dblclick", () => {
       this.zoomed = false;
     });
@@ -293,10 +318,15 @@ export class Chart {
   key(event) {
     const last = this.data.x.length - 1;
     const step = event.shiftKey ? Math.max(1, Math.round(last / 20)) : 1;
-    const to = { ArrowRight: this.at + step, ArrowLeft: this.at - step, Home: 0, End: last }[event.key];
-    if (to === undefined || !this.plot || last < 0) return;
+    if (!this.plot || last < 0) return;
+    const { min = -Infinity, max = Infinity } = this.plot.scales.x;
+    // those that are seen, where a part is shown
+    const first = this.data.x.findIndex((x) => x >= min);
+    const final = this.data.x.findLastIndex((x) => x <= max);
+    const to = { ArrowRight: this.at < first ? first : this.at + step, ArrowLeft: this.at < 0 ? final : this.at - step, Home: first, End: final }[event.key];
+    if (to === undefined) return;
     event.preventDefault();
-    const place = Math.max(0, Math.min(last, to));
+    const place = Math.max(first, Math.min(final, to));
     const value = this.data.y.map((values) => values[place]).find((found) => found !== null && found !== undefined) ?? 0;
     this.plot.setCursor({
       left: this.plot.valToPos(this.data.x[place] ?? 0, "x"),

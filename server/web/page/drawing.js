@@ -54,7 +54,8 @@ const css = (/** @type {string} */ name) => getComputedStyle(document.documentEl
  * @param {string} name of a custom property
  */
 function rgb(name) {
-  const text = css(name).replace("#", "");
+  const short = css(name).replace("#", "");
+  const text = short.length === 3 ? short.replace(/./g, "$&$&") : short;
   return [0, 2, 4].map((at) => parseInt(text.slice(at, at + 2), 16) / 255);
 }
 
@@ -78,12 +79,10 @@ export class Drawing {
   /** @type {string | null} */
   pointed = null;
   due = 0;
-  /** @type {number[]} */
-  wanted = [];
 
   /**
    * @param {HTMLElement} root
-   * @param {{label: string, read?: (text: string) => void, picked?: (boundary: string) => void}} options
+   * @param {{label: string, value?: () => string, read?: (text: string) => void, picked?: (boundary: string) => void}} options
    */
   constructor(root, options) {
     this.root = root;
@@ -143,11 +142,12 @@ export class Drawing {
   /**
    * @param {Float32Array | null} values at the corners
    * @param {[number, number]} range that is shown
+   * @param {boolean} [evenly] whether a range with both signs is made as wide on both sides of 0
    */
-  setValues(values, range) {
+  setValues(values, range, evenly = true) {
     this.values = values;
     this.range = range;
-    this.signed = range[0] < 0 && range[1] > 0;
+    this.signed = evenly && range[0] < 0 && range[1] > 0;
     if (this.signed) {
       const most = Math.max(-range[0], range[1]);
       this.range = [-most, most];
@@ -175,7 +175,6 @@ export class Drawing {
    * @param {number[]} box least x, least y, greatest x, greatest y
    */
   fit([left = 0, bottom = 0, right = 1, top = 1]) {
-    this.wanted = [left, bottom, right, top];
     const [width, height] = [this.root.clientWidth || 600, this.root.clientHeight || 400];
     this.center = [(left + right) / 2, (bottom + top) / 2];
     const size = Math.max(right - left, top - bottom, 1e-300);
@@ -264,23 +263,41 @@ export class Drawing {
     }
     const [px = 0, py = 0] = this.toPlane(x, y);
     const told = [`x = ${number(px)}, y = ${number(py)}`];
-    const corner = this.values || this.moved ? this.cornerAt(px, py) : -1;
-    if (corner >= 0 && this.values) told.push(number(this.values[corner]));
-    if (corner >= 0 && this.moved) told.push(`u = (${number(this.moved[2 * corner], 4)}, ${number(this.moved[2 * corner + 1], 4)})`);
+    const inside = this.values || this.moved ? this.elementAt(px, py) : null;
+    const at = (/** @type {Float32Array} */ values, size = 1, place = 0) => (inside ?? []).reduce((sum, [corner, weight]) => sum + weight * (values[size * corner + place] ?? NaN), 0);
+    if (inside && this.values) told.push(`${this.options.value?.() ?? "value"} = ${number(at(this.values))}`);
+    if (inside && this.moved) told.push(`u = (${number(at(this.moved, 2, 0), 4)}, ${number(at(this.moved, 2, 1), 4)})`);
     if (boundary) told.push(`boundary ${boundary}`);
     this.options.read?.(told.join(" · "));
   }
 
-  /** The corner next to a place, if it is near. */
-  cornerAt(/** @type {number} */ x, /** @type {number} */ y) {
-    const positions = /** @type {Float32Array} */ (this.view?.arrays.positions);
-    let [best, found] = [(24 / this.zoom) ** 2, -1];
-    for (let n = 0; n < positions.length / 2; n += 1) {
-      const [px = 0, py = 0] = this.place(n);
-      const far = (px - x) ** 2 + (py - y) ** 2;
-      if (far < best) [best, found] = [far, n];
+  /**
+   * The corners of the triangle, or of the half of a quadrilateral, around a place, each with its weight there.
+   * @param {number} x
+   * @param {number} y
+   * @returns {[number, number][] | null}
+   */
+  elementAt(x, y) {
+    const { quads, triangles } = this.view?.arrays ?? {};
+    const within = (/** @type {number} */ a, /** @type {number} */ b, /** @type {number} */ c) => {
+      const [ax = 0, ay = 0] = this.place(a);
+      const [bx = 0, by = 0] = this.place(b);
+      const [cx = 0, cy = 0] = this.place(c);
+      const area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay);
+      if (area === 0) return null;
+      const [v, w] = [((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / area, ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / area];
+      return v >= 0 && w >= 0 && v + w <= 1 ? /** @type {[number, number][]} */ ([[a, 1 - v - w], [b, v], [c, w]]) : null;
+    };
+    for (let n = 0; quads && n < quads.length; n += 4) {
+      const [a, b, c, d] = [quads[n] ?? 0, quads[n + 1] ?? 0, quads[n + 2] ?? 0, quads[n + 3] ?? 0];
+      const found = within(a, b, c) ?? within(a, c, d);
+      if (found) return found;
     }
-    return found;
+    for (let n = 0; triangles && n < triangles.length; n += 3) {
+      const found = within(triangles[n] ?? 0, triangles[n + 1] ?? 0, triangles[n + 2] ?? 0);
+      if (found) return found;
+    }
+    return null;
   }
 
   /** The name of the boundary next to a point of the screen. */
@@ -354,7 +371,13 @@ export class Drawing {
     for (const { points } of this.lines("obstacles")) {
       /** @type {number[][]} */
       const screen = [];
-      for (let n = 0; n + 1 < points.length; n += 2) screen.push(this.toScreen(points[n] ?? 0, points[n + 1] ?? 0));
+      for (let n = 0; n + 1 < points.length; n += 2) {
+        const [x = 0, y = 0] = this.toScreen(points[n] ?? 0, points[n + 1] ?? 0);
+        const [[bx = 0, by = 0] = [], [ax = 0, ay = 0] = []] = [screen[screen.length - 1] ?? [], screen[screen.length - 2] ?? []];
+        // points that face a curved body may come back on their line
+        const back = screen.length > 1 && (x - bx) * (bx - ax) + (y - by) * (by - ay) < -0.5 * Math.hypot(x - bx, y - by) * Math.hypot(bx - ax, by - ay);
+        if (!back && !(screen.length && x === bx && y === by)) screen.push([x, y]);
+      }
       if (screen.length < 2) continue;
       const outward = screen.map((_, n) => {
         const [ax = 0, ay = 0] = screen[Math.max(0, n - 1)] ?? [];

@@ -42,7 +42,13 @@ export function withError(value, error) {
   }
   const power = Math.floor(Math.log10(error));
   const size = Math.max(Math.abs(value), error);
-  if (size >= 1e6 || power < -6) return [number(value, 4), number(error, 2)];
+  if (size >= 1e6 || power < -6) {
+    // with one power of ten for both
+    const common = Math.floor(Math.log10(size));
+    const decimals = Math.min(14, Math.max(0, common - power + 1));
+    const shown = (/** @type {number} */ part) => `${withMinus((part / 10 ** common).toFixed(decimals))} · ${powerOfTen(common)}`;
+    return [shown(value), shown(error)];
+  }
   const decimals = Math.min(12, Math.max(0, 1 - power));
   return [withMinus(value.toFixed(decimals)), error.toFixed(decimals)];
 }
@@ -51,7 +57,7 @@ export function withError(value, error) {
 export function percent(part) {
   if (part === null || part === undefined || !Number.isFinite(part)) return "—";
   const value = 100 * part;
-  if (value > 100) return "> 100 %";
+  if (value > 1000) return `${count(Math.round(value))} %`;
   return `${value === 0 ? "0" : value < 0.01 ? "< 0.01" : value.toFixed(value < 10 ? 2 : 0)} %`;
 }
 
@@ -63,7 +69,7 @@ export function duration(seconds) {
   if (seconds < 10) return `${seconds.toFixed(1)} s`;
   if (seconds < 60) return `${Math.round(seconds)} s`;
   const minutes = Math.floor(seconds / 60);
-  if (minutes < 60) return `${minutes} min ${Math.round(seconds % 60)} s`;
+  if (minutes < 60) return `${minutes} min ${Math.floor(seconds % 60)} s`;
   const hours = Math.floor(minutes / 60);
   if (hours < 48) return `${hours} h ${minutes % 60} min`;
   return `${Math.floor(hours / 24)} days`;
@@ -88,7 +94,7 @@ export function ago(time, now = Date.now()) {
  * A time as the person's own clock shows it.
  * @param {string | null | undefined} time as RFC 3339
  */
-export const exactly = (time) => (time ? new Date(time).toLocaleString() : "");
+export const exactly = (time) => (time ? new Date(time).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "medium" }) : "");
 
 /** @param {number | null | undefined} count */
 export function bytes(count) {
@@ -118,8 +124,10 @@ const QUANTITIES = {
   normal_force: "normal force",
   tangential_force: "tangential force",
   friction_force: "friction force",
-  peak_normal_stress: "largest pressure, as σₙ",
-  peak_tangential_stress: "largest σₜ",
+  peak_normal_stress: "peak normal stress σₙ",
+  peak_tangential_stress: "peak tangential stress σₜ",
+  contact_width: "contact width",
+  run_s: "run time (s)",
   contact_start: "contact begins at s",
   contact_end: "contact ends at s",
   stick_end: "stick ends at s",
@@ -152,7 +160,7 @@ export function waits(queue) {
   if (!queue) return "waits";
   const why = WAITING[queue.reason] ?? words(queue.reason);
   if (queue.position <= 0) return why;
-  return `${ordinal(queue.position)} in line: ${why}`;
+  return `${ordinal(queue.position)} in line, ${why}`;
 }
 
 /** @param {number} place */
@@ -167,3 +175,25 @@ function ordinal(place) {
  * @param {string} text
  */
 export const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.!?]$/.test(text) ? "" : ".");
+
+/**
+ * Warnings counted by what they are called.
+ * @param {{severity: string}[]} warnings
+ */
+export function countedWarnings(warnings) {
+  const notes = warnings.filter((warning) => warning.severity === "note").length;
+  const others = warnings.length - notes;
+  return [others ? counted(others, "warning") : "", notes ? counted(notes, "note") : ""].filter(Boolean).join(", ");
+}
+
+/**
+ * Numbers that a person has typed: one, or several for a sweep, separated by spaces, semicolons, or commas with a space.
+ * @param {string} text
+ * @returns {{numbers: number[]} | {fault: string}}
+ */
+export function typedNumbers(text) {
+  if (/\d,\d/.test(text)) return { fault: `Write ${text.trim().replace(/,/g, ".")} for one number, and ${text.trim().replace(/,\s*/g, ", ")} for several.` };
+  const numbers = text.split(/[,;\s]+/).filter(Boolean).map(Number);
+  if (!numbers.length || numbers.some((value) => !Number.isFinite(value))) return { fault: `"${text}" is no number, and no list of numbers such as 0.1, 0.2, 0.3.` };
+  return { numbers };
+}

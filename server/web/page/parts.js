@@ -24,8 +24,12 @@ export function statusBadge(status, more = nothing) {
   return html`<span class="badge ${status}"><span aria-hidden="true">${sign}</span> ${word}${more}</span>`;
 }
 
-/** @param {Pick<Job, "quantities">} job */
-const withoutLimit = (job) => (job.quantities ?? []).filter((q) => q.method === "no_limit").length;
+/** @param {Pick<Job, "quantities" | "warnings">} job */
+function withoutLimit(job) {
+  const own = (job.quantities ?? []).filter((q) => q.method === "no_limit").length;
+  // a member of a sweep has no quantities in its row, but the note that there is such a number
+  return own || (!(job.quantities ?? []).length && (job.warnings ?? []).some((warning) => warning.code === "sharp_edge") ? 1 : 0);
+}
 
 /**
  * How far the numbers of a job can be trusted, as a sign, a word and a colour.

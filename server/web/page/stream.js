@@ -4,7 +4,7 @@
  * stream for a moment every few seconds: each time it goes on where it stopped.
  */
 
-import { ApiError, Unreachable, connection, pauseBefore, request, sleep } from "./api.js";
+import { ApiError, connection, isPassing, pauseBefore, request, sleep } from "./api.js";
 import { tabs } from "./tabs.js";
 
 /** How long a stream that is not kept is read: until nothing comes for a while, and not longer than the second (ms). */
@@ -53,8 +53,8 @@ export function follow(address, after, followed) {
         if (!signal.aborted) connection.lost();
       } catch (error) {
         if (closed.signal.aborted) return;
-        if (error instanceof ApiError) return followed.refused?.(error);
-        if (!given.signal.aborted && !(error instanceof Unreachable)) connection.lost();
+        if (error instanceof ApiError && !isPassing(error)) return followed.refused?.(error);
+        if (!given.signal.aborted) connection.lost();
       } finally {
         document.removeEventListener("visibilitychange", giveUp);
         tabs.removeEventListener("change", giveUp);

@@ -162,6 +162,13 @@ fn of_quantity(q: &EstimatedQuantity) -> Option<(f64, Finding)> {
 /// The verdict in a sentence.
 fn sentence(accuracy: &Accuracy, findings: &[Finding]) -> String {
     let without_limit = findings.iter().filter(|f| f.code == FindingCode::NoLimit);
+    // the reason is what permits no better verdict; what has no finding of its own is among the reasons
+    let reason = findings
+        .iter()
+        .find(|f| f.verdict == accuracy.verdict && f.code != FindingCode::NoLimit);
+    let reason = reason.map(|finding| finding.text.clone());
+    let reason = reason.or_else(|| accuracy.reasons.first().map(|text| text.replace('`', "")));
+    let reason = decapitalised(&reason.unwrap_or_default());
     let worst = findings.first().map_or("", |finding| finding.text.as_str());
     match (accuracy.verdict, without_limit.clone().count()) {
         (Verdict::Good, 0) => format!("Good: {}.", how_exact(accuracy)),
@@ -177,12 +184,8 @@ fn sentence(accuracy: &Accuracy, findings: &[Finding]) -> String {
                 names.join(", ")
             )
         }
-        (Verdict::Fair, _) => format!("Fair: {}", decapitalised(worst)),
-        (Verdict::Poor, _) if worst.is_empty() => {
-            let reason = accuracy.reasons.first().map_or("", String::as_str);
-            format!("Poor: {}", decapitalised(reason))
-        }
-        (Verdict::Poor, _) => format!("Poor: {}", decapitalised(worst)),
+        (Verdict::Fair, _) => format!("Fair: {reason}"),
+        (Verdict::Poor, _) => format!("Poor: {reason}"),
     }
 }
 

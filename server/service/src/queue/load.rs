@@ -32,7 +32,7 @@ impl LastHour {
     pub(super) fn see(&self, now: Time, queued: u64, running: u64) {
         let mut points = self.0.lock();
         match points.back_mut() {
-            Some(last) if last.t.seconds_until(now) < MINUTE_S => {
+            Some(last) if (0.0..MINUTE_S).contains(&last.t.seconds_until(now)) => {
                 last.queued = last.queued.max(queued);
                 last.running = last.running.max(running);
             }

@@ -56,12 +56,13 @@ impl By {
     }
 }
 
-/// The first valid token in the cookies of a browser, unless the request has a token of its own.
+/// The first valid token in the cookies of a browser. What else stands in `Authorization`, such as the password for a proxy, does
+/// not hide it; a token does.
 fn of_cookies<'a>(store: &Store, credentials: &'a Credentials) -> Option<(&'a Presented, Token)> {
     let now = Time::of_the_machine();
     let cookies = credentials.cookies.iter();
     let mut valid = cookies.filter_map(|sent| Some((sent, store.find_token(sent, now)?)));
-    valid.next().filter(|_| credentials.token.is_none())
+    valid.next()
 }
 
 /// Identifies the caller of a request from `peer`; the error says why there is none.

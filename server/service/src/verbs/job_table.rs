@@ -343,6 +343,9 @@ pub type Leaves = BTreeMap<String, Value>;
 
 /// The largest problem whose values a table has (bytes): one with a mesh in it is larger, and is left empty.
 const MOST_PROBLEM_BYTES: usize = 256 << 10;
+/// The most text of problems that a table reads (bytes): as values it takes many times as much memory. Further problems are
+/// left empty.
+const MOST_READ_BYTES: usize = 8 << 20;
 /// The largest number of values of one problem that are compared.
 const MOST_LEAVES: usize = 2000;
 /// The largest number of columns that are added for values that differ.
@@ -395,7 +398,7 @@ fn parameter(problems: &[Leaves], pointer: &str, jobs: usize) -> table::Values {
     }
     let text = |value: Option<&Value>| match value {
         None => Cow::Borrowed(""),
-        Some(Value::String(text)) => text.clone().into(),
+        Some(Value::String(text)) => text.chars().take(MOST_TEXT).collect::<String>().into(),
         Some(Value::Array(items)) => shortened(items).into(),
         Some(other) => other.to_string().into(),
     };
@@ -497,10 +500,15 @@ pub fn table<'a>(
         let Page { items, next } = lists::list(service, caller, &filter, order, &paging).await?;
         let mut columns = columns.unwrap_or_default();
         let mut problems: Vec<Leaves> = vec![];
+        let mut read_bytes = 0;
         if adds_differing || columns.has_parameters() {
             for job in &items {
                 let problem = service.store.small_problem(job.key, MOST_PROBLEM_BYTES);
                 let problem = problem.await?;
+                let problem = problem.filter(|text| {
+                    read_bytes += text.len();
+                    read_bytes <= MOST_READ_BYTES
+                });
                 let read = move || problem.map_or(Leaves::new(), |text| leaves_of(&text));
                 problems.push(service.work(read).await?);
             }

@@ -122,14 +122,11 @@ pub fn waiting<'a>(
             let ran = job.started_at.map_or(0.0, |start| start.seconds_until(now));
             Some(told.unwrap_or((mean? - ran).max(0.0)))
         };
-        let busy: f64 = running.iter().filter_map(rest).sum();
+        let rests: Vec<f64> = running.iter().filter_map(rest).collect();
         queued.sort_by_key(|job| job.queue.as_ref().map_or(i64::MAX, |queue| queue.position));
         let waiting = queued.into_iter().filter_map(|job| {
             let queue = job.queue?;
-            let starts = |mean: f64| {
-                let before = busy + queue.ahead as f64 * mean;
-                before / f64::from(state.workers.max(1))
-            };
+            let starts = |mean| starts_in(&rests, state.workers.max(1), queue.ahead, mean);
             let known = !state.paused && queue.position > 0;
             Some(WaitingJob {
                 id: job.id,
@@ -145,6 +142,27 @@ pub fn waiting<'a>(
             last_hour: service.queue.last_hour(),
         })
     })
+}
+
+/// In how many seconds a job starts that has `ahead` others before it, each of which takes the mean time. `rests`: how long the
+/// running jobs still take.
+fn starts_in(rests: &[f64], workers: u32, ahead: i64, mean: f64) -> f64 {
+    let mut free: Vec<f64> = rests.to_vec();
+    free.resize(free.len().max(workers as usize), 0.0);
+    free.sort_by(f64::total_cmp);
+    // each in turn takes the worker that is free first; after a whole round all have become later by the mean
+    let rounds = ahead.max(0) as usize / free.len();
+    let mut at = ahead.max(0) as usize % free.len();
+    let mut shifted: Vec<f64> = free
+        .iter()
+        .map(|rest| rest + rounds as f64 * mean)
+        .collect();
+    while at > 0 {
+        shifted.sort_by(f64::total_cmp);
+        shifted[0] += mean;
+        at -= 1;
+    }
+    shifted.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {

@@ -178,15 +178,17 @@ pub fn description<'a>(
     })
 }
 
-/// The tag of what is drawn of a job that has ended: it never changes, so that a client that has it need not be sent it, and
+/// The tag of what is drawn of a job that has ended: it changes only if its fields are deleted, so that a client that has it need not be sent it, and
 /// it need not be drawn again. `what`: the figure or field with all its parameters. `None` for a job that may still change.
 pub fn tag_of(job: &Job, what: &str) -> Option<String> {
     job.status.is_terminal().then(|| {
         let text = format!(
-            "{} {} {} {what}",
+            "{} {} {} {:?} {what}",
             env!("CARGO_PKG_VERSION"),
             job.id,
-            job.version
+            job.version,
+            // less once the fields are deleted, which makes no new version
+            job.stored_bytes
         );
         digest::hex(&Sha256::digest(text))
     })

@@ -62,7 +62,7 @@ pub enum ListPayload {
         /// The job.
         job: Box<Job>,
     },
-    /// A job was deleted, or belongs to the list no longer.
+    /// A job has changed that does not belong to the list, or not any more, or was deleted.
     Removed {
         /// The job.
         id: JobId,
@@ -93,6 +93,8 @@ pub fn watch(
     after: Option<String>,
 ) -> Result<impl Stream<Item = Result<ListEvent, ApiError>> + Send + use<>, ApiError> {
     service.accepting()?;
+    // what happens from now on is told, however late the stream is read
+    let start = service.store.changes().last();
     Ok(follow(
         Watch {
             service: service.clone(),
@@ -102,12 +104,14 @@ pub fn watch(
             next_count: Instant::now(),
         },
         after,
+        start,
     ))
 }
 
 fn follow(
     mut watch: Watch,
     after: Option<String>,
+    start: u64,
 ) -> impl Stream<Item = Result<ListEvent, ApiError>> + Send {
     try_stream! {
         let service = watch.service.clone();
@@ -116,7 +120,7 @@ fn follow(
         let resumed = after.as_deref().map(|id| watch.number(id).filter(|number| changes.after(*number).is_some()));
         // a client that asks for an event of another process, or of long ago, has missed something
         let mut reset = resumed == Some(None);
-        let mut cursor = resumed.flatten().unwrap_or_else(|| changes.last());
+        let mut cursor = resumed.flatten().unwrap_or(start);
         let mut progressed: BTreeSet<i64> = BTreeSet::new();
         let mut next_progress = Instant::now();
         let (mut uncounted, mut queue) = (true, None);

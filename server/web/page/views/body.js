@@ -17,8 +17,8 @@ const FIELDS = [
   ["principal_stress_1", "largest principal"],
   ["principal_stress_3", "smallest principal"],
   ["size", "|u|"],
-  ["contact_state", "contact"],
-  ["element_error", "error"],
+  ["contact_state", "state of contact"],
+  ["element_error", "error of elements"],
 ];
 
 export class BodyPanel {
@@ -36,8 +36,12 @@ export class BodyPanel {
   job;
   /** @type {[number, number] | undefined} */
   range;
+  /** @type {Float32Array | null} */
+  shownValues = null;
   query = "";
   loading = true;
+  /** How often a body was asked for: only the answer to the last question is shown. */
+  loads = 0;
   solved = false;
   /** @type {unknown} */
   error = null;
@@ -63,16 +67,20 @@ export class BodyPanel {
     const ended = ["succeeded", "failed", "canceled"].includes(job.status);
     this.solved = ended && job.result_available !== "none";
     this.loading = true;
+    this.loads += 1;
+    const own = this.loads;
+    this.fields.clear();
     this.draw();
     try {
       const signal = this.closed.signal;
-      const first = this.solved ? ["displacement", "von_mises"] : [];
+      const first = this.solved ? ["displacement", "von_mises", "contact_state"] : [];
       const [view, ...fields] = await Promise.all([
         getView(`v1/jobs/${job.id}/view${this.query}`, { signal }),
         ...first.map((name) => this.fetchField(name).catch(() => null)),
       ]);
+      if (own !== this.loads) return;
       this.view = view;
-      this.solved = this.solved && fields.every((field) => field !== null) && fields.length > 0;
+      this.solved = this.solved && fields.slice(0, 2).every((field) => field !== null) && fields.length > 0;
       this.error = null;
       this.loading = false;
       this.field = this.solved ? "von_mises" : "none";
@@ -81,7 +89,7 @@ export class BodyPanel {
       this.showField();
       this.showContact(true);
     } catch (error) {
-      if (this.closed.signal.aborted) return;
+      if (this.closed.signal.aborted || own !== this.loads) return;
       this.error = error instanceof ApiError || error instanceof Unreachable ? error : new Error("The body cannot be drawn.");
       this.loading = false;
       this.draw();
@@ -136,16 +144,22 @@ export class BodyPanel {
   async showField() {
     const { drawing } = this;
     if (!drawing || !this.view) return;
+    const { field } = this;
+    this.error = null;
     const values = await this.values().catch((error) => {
       this.error = error;
       return null;
     });
+    // another field was chosen meanwhile
+    if (field !== this.field) return;
     drawing.around = true;
     drawing.scale = this.scale;
     drawing.setMoved(this.field === "none" ? null : (this.fields.get("displacement") ?? null));
-    this.range = values ? robust(values) : [0, 1];
+    this.shownValues = values;
+    this.range = values ? robust(values, this.view.arrays) : [0, 1];
     const [low, high] = [this.chosen[0] ?? this.range[0] ?? 0, this.chosen[1] ?? this.range[1] ?? 1];
-    drawing.setValues(values, [low, high > low ? high : low + (Math.abs(low) || 1) * 1e-6]);
+    const chosen = this.chosen[0] !== null || this.chosen[1] !== null;
+    drawing.setValues(values, [low, high > low ? high : low + (Math.abs(low) || 1) * 1e-6], !chosen);
     this.draw();
   }
 
@@ -176,6 +190,22 @@ export class BodyPanel {
     drawing.fit([(middle[0] ?? 0) - near, (middle[1] ?? 0) - 0.8 * near, (middle[0] ?? 0) + near, (middle[1] ?? 0) + 0.6 * near]);
   }
 
+  /** What the field that is chosen is called. */
+  word() {
+    return FIELDS.find(([name]) => name === this.field)?.[1] ?? "";
+  }
+
+  /** The field in words, with its greatest value and the place of that. */
+  drawLargest() {
+    const { shownValues: values, view } = this;
+    if (!values || !view || this.field === "none") return nothing;
+    if (this.field === "contact_state") return html`Colours: ${this.word()}; −1 not on a contact, 0 open, 1 sticks, 2 slips. `;
+    let largest = 0;
+    for (let n = 0; n < values.length; n += 1) if (Math.abs(values[n] ?? 0) > Math.abs(values[largest] ?? 0)) largest = n;
+    const positions = view.arrays.positions ?? [];
+    return html`Colours: ${this.word()}, the largest at a corner of an element ${format.number(values[largest])} at x = ${format.number(positions[2 * largest], 4)}, y = ${format.number(positions[2 * largest + 1], 4)}, without a stated error. `;
+  }
+
   draw() {
     const { view } = this;
     const number = (/** @type {Event} */ event) => {
@@ -192,8 +222,8 @@ export class BodyPanel {
             }}>${word}</button>`)}</div>`
           : nothing}
         <div class="tools">
-          <button type="button" class="small" @click=${() => this.drawing?.showAll()}>whole body</button>
-          <button type="button" class="small" @click=${() => this.showContact(false)}>contact</button>
+          <button type="button" class="small" @click=${() => this.drawing?.showAll()}>show the whole body</button>
+          <button type="button" class="small" @click=${() => this.showContact(false)}>show the contact</button>
           <label><input type="checkbox" .checked=${this.drawing?.edges ?? true} @change=${(/** @type {Event} */ event) => {
             if (!this.drawing) return;
             this.drawing.edges = /** @type {HTMLInputElement} */ (event.target).checked;
@@ -218,11 +248,12 @@ export class BodyPanel {
         ${this.loading ? parts.loading("Loading the body") : nothing}
         <div id="drawing"></div>
         <p class="readout" id="body-readout"></p>
-        <p class="note">${view ? `${format.count(view.head.elements)} elements, ${format.count(view.head.nodes)} nodes. ` : ""}Drag moves, Ctrl and the wheel zoom (the wheel alone, once it was clicked), a double click shows all.</p>`,
+        <p class="note">${this.drawLargest()}${view ? `${format.count(view.head.elements)} elements, ${format.count(view.head.nodes)} nodes. ` : ""}Drag moves, Ctrl and the wheel zoom (the wheel alone, once it was clicked), a double click shows all.</p>`,
       this.root,
     );
     this.drawing ??= new Drawing(/** @type {HTMLElement} */ (this.root.querySelector("#drawing")), {
       label: "The body",
+      value: () => this.word(),
       read: (text) => {
         const place = this.root.querySelector("#body-readout");
         if (place) place.textContent = text;
@@ -232,16 +263,37 @@ export class BodyPanel {
 }
 
 /**
- * A range that leaves out a few values that are far beyond the others, as at a singular corner.
- * @param {Float32Array} values
+ * A range that leaves out values on a very small part of the body that are far beyond all others, as at a singular corner.
+ * @param {Float32Array} values at the corners
+ * @param {Record<string, any>} arrays of the view
  * @returns {[number, number]}
  */
-function robust(values) {
-  const finite = values.filter((value) => Number.isFinite(value));
-  finite.sort();
-  if (!finite.length) return [0, 1];
-  const at = (/** @type {number} */ part) => finite[Math.min(finite.length - 1, Math.floor(part * finite.length))] ?? 0;
-  const [least, low, high, most] = [at(0), at(0.01), at(0.99), at(1)];
-  const room = 2 * Math.max(high - low, 1e-300);
-  return [least < low - room ? low : least, most > high + room ? high : most];
+function robust(values, { positions, quads, triangles }) {
+  /** The mean and the area of each element. @type {[number, number][]} */
+  const weighed = [];
+  let [least, most] = [Infinity, -Infinity];
+  for (const [ids, size] of /** @type {[Uint32Array, number][]} */ ([[quads, 4], [triangles, 3]])) {
+    for (let n = 0; n < ids.length; n += size) {
+      let [area, sum] = [0, 0];
+      for (let k = 0; k < size; k += 1) {
+        const [a, b] = [ids[n + k] ?? 0, ids[n + ((k + 1) % size)] ?? 0];
+        area += 0.5 * (positions[2 * a] * positions[2 * b + 1] - positions[2 * b] * positions[2 * a + 1]);
+        const value = values[a] ?? 0;
+        sum += value / size;
+        [least, most] = [Math.min(least, value), Math.max(most, value)];
+      }
+      if (Number.isFinite(sum)) weighed.push([sum, Math.abs(area)]);
+    }
+  }
+  if (!weighed.length || !(most > least)) return [Number.isFinite(least) ? least : 0, Number.isFinite(most) ? most : 1];
+  weighed.sort((a, b) => a[0] - b[0]);
+  const total = weighed.reduce((all, [, area]) => all + area, 0);
+  const at = (/** @type {number} */ part) => {
+    let sum = 0;
+    for (const [value, area] of weighed) if ((sum += area) >= part * total) return value;
+    return most;
+  };
+  const [low, high] = [at(0.002), at(0.998)];
+  const room = 1.5 * Math.max(high - low, 1e-300);
+  return [least < low - room ? low - 0.25 * (high - low) : least, most > high + room ? high + 0.25 * (high - low) : most];
 }

@@ -132,6 +132,18 @@ class CompareView {
     return this.columns.filter((name) => name.startsWith("/"));
   }
 
+  /**
+   * The contact of jobs whose rows have no numbers, as members of a sweep.
+   * @param {AbortSignal} signal
+   */
+  async findBoundary(signal) {
+    const row = this.rows.find((row) => row.status === "succeeded");
+    if (!row) return;
+    /** @type {import("../types").Result | null} */
+    const result = await getSurely(`v1/jobs/${row.id}/result`, signal).catch(() => null);
+    this.boundary = Object.keys(result?.summary.contacts ?? {})[0] ?? "";
+  }
+
   /** @param {string} name of a column */
   isNumber(name) {
     return this.rows.some((row) => typeof row[name] === "number");
@@ -149,14 +161,18 @@ class CompareView {
 
   async readProfiles() {
     const { signal } = this.closed;
-    const wanted = this.rows.filter((row) => row.status === "succeeded" && String(row.contacts ?? "").split(", ").includes(this.boundary)).slice(0, MOST_CURVES);
+    if (!this.boundary) await this.findBoundary(signal);
+    if (!this.boundary) return this.draw();
+    const wanted = this.rows.filter((row) => row.status === "succeeded" && (!row.contacts || String(row.contacts).split(", ").includes(this.boundary))).slice(0, MOST_CURVES);
+    const { boundary } = this;
     const queue = wanted.filter((row) => !this.profiles.has(row.id));
     const work = async () => {
       for (let row = queue.shift(); row; row = queue.shift()) {
         const path = `v1/jobs/${row.id}/profiles/${encodeURIComponent(this.boundary)}?format=json&points=${wanted.length > 20 ? 300 : "nodes"}`;
         /** @type {ContactProfile | null} */
         const profile = await getSurely(path, signal).catch(() => null);
-        if (signal.aborted) return;
+        // another contact was chosen meanwhile
+        if (signal.aborted || boundary !== this.boundary) return;
         if (profile) this.profiles.set(row.id, profile);
         this.loading = queue.length ? `${this.profiles.size} of ${format.counted(wanted.length, "profile")} read` : "";
         this.drawSoon();
@@ -182,6 +198,8 @@ class CompareView {
   }
 
   drawn() {
+    const asked = (this.query?.get("ids") ?? "").split(",").filter(Boolean).length;
+    const missing = this.loading ? 0 : asked - this.rows.length;
     const csv = this.filters();
     csv.set("columns", COLUMNS.join(","));
     csv.set("differing", "true");
@@ -190,7 +208,7 @@ class CompareView {
     const across = [...this.parameters(), ...NUMBERS].filter((name) => this.isNumber(name));
     const curves = this.profiles.size;
     return html`<h1>Compare</h1>
-      <p class="note">${this.loading || html`${format.counted(this.rows.length, "job")}${this.more ? `, of more than ${format.count(MOST_ROWS)}: the first are shown` : ""}${curves ? `; ${format.counted(curves, "profile")}` : ""}. Choose jobs in <a href="#/jobs">the list</a>, or filter there and compare all that match.`}</p>
+      <p class="note">${this.loading || html`${format.counted(this.rows.length, "job")}${this.more ? `, of more than ${format.count(MOST_ROWS)}: the first are shown` : ""}${curves ? `; ${format.counted(curves, "profile")}` : ""}${missing > 0 ? `; ${format.counted(missing, "job")} of the address cannot be found, deleted or of another owner` : ""}. Choose jobs in <a href="#/jobs">the list</a>, or filter there and compare all that match.`}</p>
       ${this.error ? parts.errorBox(this.error, () => this.read()) : nothing}
       ${this.rows.length === 0 && !this.loading ? html`<p class="empty">There is nothing to compare yet.</p>` : nothing}
       <div class="columns">
@@ -201,7 +219,7 @@ class CompareView {
             this.readProfiles();
           }}>${contacts.map((name) => html`<option ?selected=${name === this.boundary}>${name}</option>`)}</select></label>` : nothing}
           <button type="button" class="small" @click=${() => this.saveSvg()}>Save as SVG</button></div>
-          <div id="normal"></div><div id="tangential"></div>
+          <div id="normal"></div><div id="tangential"></div><p class="readout" id="values"></p>
           <p class="legend">${curves <= 8 ? this.rows.filter((row) => this.profiles.has(row.id)).map((row, n) => html`<span class="c${(n % 4) + 1} ${n > 3 ? "dash" : ""}"><i></i>${this.nameOf(row)}</span>`) : html`<span><i></i>the baseline</span><span class="old"><i></i>the others</span>`}</p>
         </section>
         <section class="panel" ?hidden=${!this.rows.length}><h2>Points</h2>
@@ -223,7 +241,7 @@ class CompareView {
     return html`<label>${axis === "x" ? "across" : "up"} <select @change=${(/** @type {Event} */ event) => {
       this[axis] = /** @type {HTMLSelectElement} */ (event.target).value;
       this.draw();
-    }}>${names.map((name) => html`<option ?selected=${name === this[axis]}>${name}</option>`)}</select></label>`;
+    }}>${names.map((name) => html`<option value=${name} ?selected=${name === this[axis]}>${format.quantity(name)}</option>`)}</select></label>`;
   }
 
   /** @param {TableRow} row */
@@ -244,7 +262,7 @@ class CompareView {
   drawTable() {
     const names = ["name", ...this.parameters().slice(0, 8), "verdict", ...NUMBERS];
     const base = this.rows.find((row) => row.id === this.baseline);
-    return html`<div class="table-box"><table class="numbers"><thead><tr><th scope="col">baseline</th>${names.map((name) => html`<th scope="col" class=${name === "name" || name === "verdict" ? "" : "number"}>${name}</th>`)}</tr></thead>
+    return html`<div class="table-box"><table class="numbers"><thead><tr><th scope="col">baseline</th>${names.map((name) => html`<th scope="col" class=${name === "name" || name === "verdict" ? "" : "number"}>${name.startsWith("/") ? html`<code>${name}</code>` : format.quantity(name)}</th>`)}</tr></thead>
       <tbody>${this.rows.slice(0, this.shown).map((row) => html`<tr class=${row.id === this.baseline ? "picked" : ""}>
         <td><input type="radio" name="baseline" aria-label="Compare with ${this.nameOf(row)}" .checked=${row.id === this.baseline} @change=${() => {
           this.baseline = row.id;
@@ -270,7 +288,8 @@ class CompareView {
     if (typeof value !== "number") return html`<td class="number">${shown(value)}</td>`;
     const [text, error] = format.withError(value, row[`${name}_error`]);
     const before = base && base.id !== row.id ? base[name] : null;
-    const change = typeof before === "number" && before !== 0 && NUMBERS.includes(name) ? value / before - 1 : null;
+    const ratio = typeof before === "number" && before !== 0 && NUMBERS.includes(name) ? value / before - 1 : null;
+    const change = ratio !== null && Math.abs(ratio) < 5e-5 ? null : ratio;
     return html`<td class="number">${text}${error === "—" ? nothing : html` <span class="error-of">± ${error}</span>`}
       ${change === null ? nothing : html`<br /><span class="note">${change > 0 ? "+" : "−"}${format.percent(Math.abs(change))}</span>`}</td>`;
   }
@@ -288,10 +307,23 @@ class CompareView {
         })
         .sort((a, b) => Number(a.color === "--curve-1") - Number(b.color === "--curve-1"));
     const find = (/** @type {string} */ id) => /** @type {HTMLElement} */ (this.root.querySelector(`#${id}`));
-    this.chart ??= new Chart(find("normal"), { label: "Normal stresses", x: "", y: "normal stress", robust: true, sync: "compare" });
+    this.chart ??= new Chart(find("normal"), { label: "Normal stresses", x: "", y: "normal stress", robust: true, sync: "compare", read: (place) => this.read_(place) });
     this.chart.set(curves("normal_stress"));
     this.tangential ??= new Chart(find("tangential"), { label: "Tangential stresses", x: "arc length s", y: "tangential stress", robust: true, sync: "compare" });
     this.tangential.set(curves("tangential_stress"));
+  }
+
+  /** @param {number | null} place of the common arc lengths */
+  read_(place) {
+    const readout = this.root.querySelector("#values");
+    const chart = this.chart;
+    if (!readout || !chart) return;
+    const { curves, data } = chart;
+    const told = place === null ? [] : curves.slice(0, 8).map((curve, n) => {
+      const value = data.y[n]?.[place];
+      return value === null || value === undefined ? "" : `${curve.label}: ${format.number(value)}`;
+    });
+    readout.textContent = place === null ? "" : `s = ${format.number(data.x[place])}, σₙ of ${told.filter(Boolean).join(", ")}`;
   }
 
   /** Points of the scatter on the canvas: x, y and the id. @type {[number, number, string][]} */
@@ -371,17 +403,23 @@ class CompareView {
     const most = Math.max(...all.map((profile) => profile.s[profile.s.length - 1] ?? 0), 1e-300);
     const colors = ["#1f5ca8", "#b8410f", "#2b7a3d", "#7a4fa3"];
     const panel = (/** @type {"normal_stress" | "tangential_stress"} */ column, /** @type {number} */ top) => {
-      const [low, high] = robustRange(all.map((profile) => profile[column])).range;
-      const x = (/** @type {number} */ s) => 70 + (s / most) * (width - 90);
-      const y = (/** @type {number} */ value) => top + 20 + ((high - Math.max(low, Math.min(high, value))) / (high - low)) * (height - 60);
-      const lines = all.map((profile, n) => `<polyline fill="none" stroke="${colors[n % 4]}" stroke-width="1.2" points="${profile.s.map((s, k) => `${x(s).toFixed(1)},${y(profile[column][k] ?? 0).toFixed(1)}`).join(" ")}"/>`);
-      const ticks = [0, 0.25, 0.5, 0.75, 1].map((part) => {
-        const [s, value] = [part * most, low + part * (high - low)];
-        return `<text x="${x(s)}" y="${top + height - 24}" text-anchor="middle">${format.number(s, 4)}</text><text x="64" y="${y(value) + 4}" text-anchor="end">${format.number(value, 4)}</text>`;
-      });
-      return `<rect x="70" y="${top + 20}" width="${width - 90}" height="${height - 60}" fill="none" stroke="#888"/>${lines.join("")}${ticks.join("")}<text x="70" y="${top + 13}">${format.words(column)} along ${escaped(this.boundary)}</text>`;
+      const ranges = all.map((profile) => robustRange([profile[column]], profile.s).range);
+      const [low, high] = [Math.min(...ranges.map(([least]) => least)), Math.max(...ranges.map(([, greatest]) => greatest))];
+      const x = (/** @type {number} */ s) => 80 + (s / most) * (width - 100);
+      const y = (/** @type {number} */ value) => top + 20 + ((high - Math.max(low, Math.min(high, value))) / (high - low)) * (height - 70);
+      const lines = all.map((profile, n) => `<polyline fill="none" stroke="${colors[n % 4]}" stroke-width="1.2"${n % 8 > 3 ? ' stroke-dasharray="6 3"' : ""} points="${profile.s.map((s, k) => `${x(s).toFixed(1)},${y(profile[column][k] ?? 0).toFixed(1)}`).join(" ")}"/>`);
+      const marks = [
+        ...round(0, most).map((s) => `<line x1="${x(s)}" x2="${x(s)}" y1="${top + height - 50}" y2="${top + height - 45}" stroke="#888"/><text x="${x(s)}" y="${top + height - 31}" text-anchor="middle">${format.number(s, 4)}</text>`),
+        ...round(low, high).map((value) => `<line x1="75" x2="80" y1="${y(value)}" y2="${y(value)}" stroke="#888"/><text x="71" y="${y(value) + 4}" text-anchor="end">${format.number(value, 4)}</text>`),
+      ];
+      return `<rect x="80" y="${top + 20}" width="${width - 100}" height="${height - 70}" fill="none" stroke="#888"/>${lines.join("")}${marks.join("")}<text x="80" y="${top + 13}">${format.words(column)} along ${escaped(this.boundary)}</text><text x="${80 + (width - 100) / 2}" y="${top + height - 14}" text-anchor="middle">arc length s</text>`;
     };
-    const text = `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${2 * height}" font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#fff"/>${panel("normal_stress", 0)}${panel("tangential_stress", height)}</svg>`;
+    const legend = rows.slice(0, 24).map((row, n) => {
+      const [left, top] = [80 + 210 * (n % 3), 2 * height + 18 + 18 * Math.floor(n / 3)];
+      return `<line x1="${left}" x2="${left + 22}" y1="${top - 4}" y2="${top - 4}" stroke="${colors[n % 4]}" stroke-width="2"${n % 8 > 3 ? ' stroke-dasharray="6 3"' : ""}/><text x="${left + 28}" y="${top}">${escaped(String(this.nameOf(row)).slice(0, 28))}</text>`;
+    });
+    const whole = 2 * height + 30 + 18 * Math.ceil(legend.length / 3);
+    const text = `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${whole}" font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#fff"/>${panel("normal_stress", 0)}${panel("tangential_stress", height)}${legend.join("")}</svg>`;
     parts.save("profiles.svg", "image/svg+xml", text);
   }
 }
@@ -395,6 +433,20 @@ const withoutLimit = (count) => new Array(count || 0).fill({ method: "no_limit" 
 
 /** @param {unknown} value */
 const shown = (value) => (typeof value === "number" ? format.number(value, 6) : value === null || value === undefined || value === "" ? "—" : String(value));
+
+/**
+ * Round numbers from one to another, about five of them.
+ * @param {number} low
+ * @param {number} high
+ */
+function round(low, high) {
+  const rough = (high - low) / 5 || 1;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = power * ([1, 2, 5, 10].find((factor) => factor * power >= rough) ?? 10);
+  const found = [];
+  for (let n = Math.ceil(low / step); n * step <= high + 1e-9 * step; n += 1) found.push(n * step);
+  return found;
+}
 
 /** @param {string} text */
 const escaped = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");

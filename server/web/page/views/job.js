@@ -1,7 +1,7 @@
 /** One job: watched while it runs, read when it has ended. */
 
 import { html, nothing, render } from "../vendor/lit-html-3.3.3/lit-html.js";
-import { ApiError, getSurely, getView, newKey, send } from "../api.js";
+import { ApiError, getSurely, newKey, request, send } from "../api.js";
 import { Chart, thinned } from "../chart.js";
 import * as format from "../format.js";
 import * as parts from "../parts.js";
@@ -60,9 +60,12 @@ class JobView {
   /** @type {(() => void) | undefined} */
   unfollow;
   description = "";
+  /** Whether the job whose result has answered this one may be seen. */
+  earlier = false;
   /** @type {unknown} */
   error = null;
   language = "Python";
+  asking = false;
   /** When it was drawn last (ms). */
   drawnAt = 0;
 
@@ -123,11 +126,17 @@ class JobView {
     this.app.title(this.name());
     this.draw();
     this.loadDescription();
+    if (this.job?.cached_from) {
+      const earlier = request(`v1/jobs/${this.job.cached_from}`, { signal });
+      earlier.then(() => (this.earlier = true), () => undefined).then(() => this.drawSoon());
+    }
     if (this.ended()) {
       await Promise.all([this.loadHistory("&max_points=2000"), this.loadResult()]);
     } else {
       await this.loadHistory(`&max_points=${FIRST_ROWS}`);
       const last = this.rows[this.rows.length - 1];
+      // it has ended meanwhile: all its events come, and rows without a number would come twice
+      if (last && (last.seq === null || last.seq === undefined)) this.rows = [];
       this.watch(last?.seq ?? 0);
       if (this.job?.result_available === "partial") this.loadResult();
       this.poll = setInterval(() => this.ask(), POLL);
@@ -160,7 +169,11 @@ class JobView {
     const { signal } = this.closed;
     if (!this.job || this.job.result_available === "none") return;
     try {
-      this.result = await getSurely(this.path("/result"), signal);
+      /** @type {Result} */
+      const result = await getSurely(this.path("/result"), signal);
+      // asked while the job ran, and answered after its end
+      if (result.result_available === "partial" && this.ended() && !this.partial()) return;
+      this.result = result;
     } catch (error) {
       if (signal.aborted || (error instanceof ApiError && [404, 409].includes(error.status))) return;
       this.error = error;
@@ -182,10 +195,12 @@ class JobView {
 
   /** Asks how far a running job is: whether it has a partial result is no event. */
   async ask() {
-    if (document.hidden || this.ended()) return;
+    if (document.hidden || this.ended() || this.asking) return;
+    this.asking = true;
     const before = this.job;
     /** @type {Job} */
     const job = await getSurely(this.path(""), this.closed.signal).catch(() => /** @type {any} */ (before));
+    this.asking = false;
     if (this.ended() || !job) return;
     this.job = job;
     if (job.result_available === "partial") await this.loadResult();
@@ -209,15 +224,16 @@ class JobView {
         this.warnings.push(event);
         break;
       case "status":
+        if (event.attempt > this.job.attempt) Object.assign(this, { meshes: [], warnings: [] });
         this.job = { ...this.job, status: event.status, attempt: Math.max(this.job.attempt, event.attempt) };
-        if (event.reason) this.app.say(event.reason === "drain" ? "The service stops: the job waits again." : "The service was restarted: the job waits again.");
+        if (event.reason) this.app.say(event.reason === "drain" ? "The service stops: the job waits again." : `The job waits again: ${format.words(event.reason)}.`);
         this.ask();
         break;
       case "done":
         this.job = event.job;
         clearInterval(this.poll);
         this.draw();
-        this.app.say(`The job has ${event.job.status}.`.replace("has canceled", "was canceled"));
+        this.app.say(`${this.name()} ${{ succeeded: "has succeeded", failed: "has failed" }[/** @type {string} */ (event.job.status)] ?? "was canceled"}.`);
         this.loadResult();
         this.body?.load(event.job, this.partial());
         return;
@@ -276,12 +292,12 @@ class JobView {
           ${this.drawNumbers()}
           <section class="panel" ?hidden=${this.refinements().length < 2}><h2>Error by mesh</h2><div id="refining"></div>
             <p class="note">The largest relative error against the number of elements.</p></section>
-          <section class="panel"><h2>What is asked</h2>
+          <section class="panel"><h2>The problem in words</h2>
             ${this.description ? html`<p>${this.description}</p>` : nothing}
-            <p class="note">${job.cached_from ? html`Answered by the result of <a href=${parts.jobAddress(job.cached_from)}>an earlier job</a>. ` : nothing}
+            <p class="note">${job.cached_from ? html`Answered by the result of ${this.earlier ? html`<a href=${parts.jobAddress(job.cached_from)}>an earlier job</a>` : "an earlier job"} with the same problem. ` : nothing}
             ${job.parent ? html`Tried again after <a href=${parts.jobAddress(job.parent)}>another job</a>. ` : nothing}
             ${job.sweep ? html`Solves members of <a href=${address(`sweeps/${job.sweep}`)}>a sweep</a>. ` : nothing}
-            Accepted ${parts.age(job.created_at)} ago${job.started_at ? html`, waited ${format.duration(job.queue_wait_s)}` : nothing}.</p></section>
+            Accepted ${parts.age(job.created_at)}, ${format.exactly(job.created_at)}${job.started_at ? html`, waited ${format.duration(job.queue_wait_s)}` : nothing}.</p></section>
           ${this.drawDownloads(job)} ${this.drawCode()}
         </div>
       </div>`;
@@ -299,7 +315,9 @@ class JobView {
       html`<button type="button" @click=${() => action().catch((error) => this.app.say(error.message))}>${word}</button>`;
     return html`
       ${!this.ended() && this.app.may("cancel")
-        ? act(job.cancel_requested ? "Is asked to stop" : "Stop", async () => {
+        ? act(job.cancel_requested ? "Is being canceled" : "Cancel", async () => {
+            const whose = job.owner === "local" || job.owner === this.app.me.owner ? "this job" : `this job of ${job.owner}`;
+            if (!confirm(`Cancel ${whose}?`)) return;
             const answer = await send("POST", this.path("/cancel"));
             this.job = /** @type {any} */ (answer).job;
             this.draw();
@@ -342,25 +360,25 @@ class JobView {
     const kind = job.status === "succeeded" ? (found?.kind ?? "good") : "poor";
     const summary = this.result?.summary;
     const warnings = summary?.warnings ?? job.warnings ?? [];
+    const said = (assessment?.sentence ?? "").toLowerCase();
+    const others = (assessment?.findings ?? []).filter((finding) => !said.includes(finding.text.toLowerCase().replace(/\.$/, "")));
     return html`<section class="panel verdict trust-${kind}" aria-label="Verdict">
       ${job.status === "succeeded" ? parts.trustBadge(job) : html`<span class="badge failed">✕ no solution</span>`}
       ${job.failure
-        ? html`<p class="sentence">${job.failure.title}</p><p>${format.sentence(job.failure.detail)} <a href=${`v1/errors/${job.failure.code}`}>What to do</a></p>`
+        ? html`<p class="sentence">${job.failure.title}</p><p>${format.sentence(job.failure.detail)} <a href=${`v1/errors/${job.failure.code}`} target="_blank">What to do</a></p>`
         : job.status === "canceled"
-          ? html`<p class="sentence">The job was stopped before it was solved.</p>`
+          ? html`<p class="sentence">The job was canceled before it was solved.</p>`
           : html`<p class="sentence">${assessment?.sentence ?? (summary ? "The result has no stated errors." : "Loading the result …")}</p>`}
       ${this.partial() && this.result ? html`<p class="box warning">What is shown below is the state at which the job stopped, not a solution.</p>` : nothing}
-      ${(assessment?.findings ?? []).length > 1
-        ? html`<ul>${assessment?.findings.map((finding) => html`<li>${finding.text}</li>`)}</ul>`
-        : nothing}
+      ${others.length ? html`<ul>${others.map((finding) => html`<li>${finding.text}</li>`)}</ul>` : nothing}
       ${summary
         ? html`<p class="note">${format.counted(summary.iterations, "iteration")} · residual ${format.number(Math.max(summary.residuals.kkt, summary.residuals.friction), 2)} · forces in balance to ${format.number(summary.residuals.equilibrium, 2)}
             ${summary.uniqueness ? ` · ${summary.uniqueness.agrees ? "one solution" : "not unique"}` : ""}
             ${summary.contraction ? ` · contraction ${format.number(summary.contraction, 2)}` : ""}</p>`
         : nothing}
       ${warnings.length
-        ? html`<details ?open=${warnings.some((warning) => warning.severity === "serious")}><summary>${format.counted(warnings.length, "warning")} and notes</summary>
-            <ul>${warnings.map((warning) => html`<li><strong>${warning.severity}</strong> ${warning.message} <a href=${`v1/warnings/${warning.code}`}>${format.words(warning.code)}</a> <code>${warning.pointer}</code></li>`)}</ul></details>`
+        ? html`<details ?open=${warnings.some((warning) => warning.severity === "serious")}><summary>${format.countedWarnings(warnings)}</summary>
+            <ul>${warnings.map((warning) => html`<li><strong>${warning.severity}</strong> ${warning.message} <a href=${`v1/warnings/${warning.code}`} target="_blank">${format.words(warning.code)}</a> <code>${warning.pointer}</code></li>`)}</ul></details>`
         : nothing}
     </section>`;
   }
@@ -371,10 +389,12 @@ class JobView {
       return html`<section class="panel verdict" role="status"><p class="sentence">Waits: ${format.waits(job.queue)}.</p></section>`;
     }
     const progress = job.progress;
-    const last = this.rows[this.rows.length - 1];
+    const own = this.rows.findIndex((row) => row.attempt === job.attempt);
+    const last = own < 0 ? undefined : this.rows[this.rows.length - 1];
+    const begun = own < 0 ? undefined : this.rows[own];
     const residual = last ? Math.max(last.residual, last.friction_residual) : progress?.residual;
     const tolerance = last?.tolerance ?? progress?.tolerance ?? null;
-    const start = this.rows[0] ? Math.max(this.rows[0].residual, this.rows[0].friction_residual) : null;
+    const start = begun ? Math.max(begun.residual, begun.friction_residual) : null;
     const part = residual && tolerance && start && start > tolerance ? Math.log(residual / start) / Math.log(tolerance / start) : null;
     const mesh = this.meshes[this.meshes.length - 1] ?? (progress?.mesh ? { number: progress.mesh, elements: progress.mesh_elements, error: progress.mesh_error } : null);
     return html`<section class="panel verdict" aria-label="Progress">
@@ -484,10 +504,12 @@ class JobView {
         <dt>friction force</dt><dd>${format.number(summary.friction_force)}</dd></dl></section>`;
     }
     return html`<section class="panel"><h2>Numbers</h2><div class="table-box"><table class="numbers">
-      <thead><tr><th scope="col">quantity</th><th class="number" scope="col">value</th><th class="number" scope="col">± error</th><th class="number" scope="col">relative</th></tr></thead>
+      <thead><tr><th scope="col">quantity</th><th class="number" scope="col">value</th><th class="number" scope="col">± error</th><th class="number" scope="col">± in %</th></tr></thead>
       <tbody>${contacts.map((contact) => html`
         ${contacts.length > 1 ? html`<tr><th colspan="4" scope="rowgroup">${contact}</th></tr>` : nothing}
-        ${quantities.filter((q) => q.contact === contact).map((q) => this.drawNumber(q))}`)}</tbody></table></div></section>`;
+        ${quantities.filter((q) => q.contact === contact).map((q) => this.drawNumber(q))}`)}</tbody></table></div>
+      <p class="note">Percentages are parts of the number; for ends of contact of the length of the contact, in a half model of both halves, and for tangential numbers of the friction that acts.
+        ${quantities.some((q) => q.increments || q.direction || q.measurement) ? "* the error has further parts: point at it." : nothing}</p></section>`;
   }
 
   /** @param {import("../types").EstimatedQuantity} q */
@@ -509,7 +531,7 @@ class JobView {
     const file = (/** @type {string} */ name, /** @type {string} */ path) => html`<a class="button small" href=${this.path(path)} download>${name}</a>`;
     const contacts = Object.keys(this.result?.summary.contacts ?? {});
     const solved = job.result_available !== "none";
-    return html`<section class="panel"><h2>Download</h2><div class="downloads">
+    return html`<section class="panel screen"><h2>Download</h2><div class="downloads">
       ${file("problem.json", "/problem")}
       ${solved ? contacts.map((name) => file(`profile ${name}.csv`, `/profiles/${encodeURIComponent(name)}?format=csv${partial}`)) : nothing}
       ${solved && this.ended() ? html`${file("fields.vtu (ParaView)", `/fields?format=vtu${partial}`)}${file("fields.npz (NumPy)", `/fields?format=npz${partial}`)}${file("result.json", "/result")}` : nothing}
@@ -527,7 +549,7 @@ class JobView {
       curl: `curl ${url}/v1/jobs/${this.id}/result`,
       "command line": `export SIGNORINI_URL=${url}\nsignorini result ${this.id}`,
     };
-    return html`<section class="panel"><h2>As code</h2>
+    return html`<section class="panel screen"><h2>The same by a program</h2>
       <div class="tabs" role="tablist">${Object.keys(texts).map((name) => html`<button type="button" role="tab" aria-selected=${this.language === name} @click=${() => {
         this.language = name;
         this.draw();

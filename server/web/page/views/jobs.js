@@ -66,8 +66,12 @@ class JobList {
   closed = new AbortController();
   /** @type {(() => void) | null} */
   unfollow = null;
-  /** @type {string[]} */
-  before = [];
+  /** Whether the stream has begun, after which the list is read: nothing that changes meanwhile is missed. */
+  begun = false;
+  /** What was told of jobs while the list was read. @type {any[]} */
+  early = [];
+  due = 0;
+  asking = false;
 
   /**
    * @param {HTMLElement} root
@@ -113,23 +117,29 @@ class JobList {
     this.closed.abort();
     this.unfollow?.();
     const closed = (this.closed = new AbortController());
-    Object.assign(this, { stale: true, error: null, all: false, at: -1, counts: null });
+    Object.assign(this, { stale: true, error: null, all: false, at: -1, counts: null, begun: false, early: [] });
     this.selected.clear();
     this.draw();
     const filters = this.filters();
     const query = new URLSearchParams(filters);
     query.set("fields", FIELDS);
-    // first: nothing that changes while the list is read is missed
     this.unfollow = follow((after) => `v1/events?${query}${after ? `&after=${encodeURIComponent(after)}` : ""}`, "", {
       event: (data) => this.told(data),
       refused: (error) => this.failed(error),
     });
+  }
+
+  async readRows() {
+    const closed = this.closed;
+    const query = this.filters();
+    query.set("fields", FIELDS);
     try {
       const rows = await this.page(query, this.query.get("page_token") ?? "", closed.signal);
       if (closed.signal.aborted) return;
       Object.assign(this, { rows, stale: false });
       this.gone.clear();
       this.fresh.clear();
+      this.early.splice(0).forEach((event) => this.told(event));
       this.draw();
       this.readKeys(closed.signal);
     } catch (error) {
@@ -179,6 +189,14 @@ class JobList {
 
   /** @param {any} event of the stream of the list */
   told(event) {
+    if (!this.begun && event.type !== "reset") {
+      this.begun = true;
+      this.readRows();
+    }
+    if (this.stale && ["job", "removed"].includes(event.type)) {
+      this.early.push(event);
+      return;
+    }
     switch (event.type) {
       case "reset":
         this.read();
@@ -189,7 +207,7 @@ class JobList {
       case "job": {
         const place = this.rows.findIndex((row) => row.id === event.job.id);
         if (place >= 0) {
-          this.rows[place] = event.job;
+          if (event.job.version >= (this.rows[place]?.version ?? 0)) this.rows[place] = event.job;
           this.gone.delete(event.job.id);
         } else if (!this.stale && this.isNew(event.job)) {
           this.fresh.add(event.job.id);
@@ -204,7 +222,15 @@ class JobList {
         if (this.rows.some((row) => row.status === "queued")) this.readWaiting();
         break;
     }
-    this.draw();
+    this.drawSoon();
+  }
+
+  /** Draws once for all that is told at a time. */
+  drawSoon() {
+    this.due ||= requestAnimationFrame(() => {
+      this.due = 0;
+      this.draw();
+    });
   }
 
   /** @param {Job} job that is not in the list */
@@ -215,15 +241,18 @@ class JobList {
 
   /** Reads the places of waiting rows again, which change when other jobs start. */
   async readWaiting() {
+    if (this.asking) return;
+    this.asking = true;
     const waiting = this.rows.filter((row) => row.status === "queued").map((row) => row.id);
     const query = new URLSearchParams({ fields: FIELDS, page_size: String(PAGE) });
     waiting.forEach((id) => query.append("id", id));
     const closed = this.closed.signal;
     /** @type {import("../types").JobList} */
     const page = await getSurely(`v1/jobs?${query}`, closed).catch(() => ({ jobs: [], next_page_token: null }));
+    this.asking = false;
     for (const job of page.jobs) {
       const place = this.rows.findIndex((row) => row.id === job.id);
-      if (place >= 0) this.rows[place] = job;
+      if (place >= 0 && job.version >= (this.rows[place]?.version ?? 0)) this.rows[place] = job;
     }
     this.draw();
   }
@@ -298,22 +327,29 @@ class JobList {
   async change(what) {
     const filters = this.selectedFilters();
     const many = this.all ? (this.total() ?? 0) : this.selected.size;
-    const all = this.all && !filters.toString();
-    if (all) filters.append("created_before", new Date(Date.now() + 60_000).toISOString());
-    const done = what === "cancel" ? "stop" : "delete";
+    // not those that are accepted after the question
+    if (this.all && !filters.has("created_before")) filters.append("created_before", this.newest());
+    const done = what === "cancel" ? "cancel" : "delete";
     if (!confirm(`Really ${done} ${format.counted(many, "job")}?${what === "delete" ? " Their results are lost." : ""}`)) return;
     try {
       const path = what === "cancel" ? `v1/jobs/cancel?${filters}` : `v1/jobs?${filters}`;
       /** @type {import("../types").Many} */
       const answer = await send(what === "cancel" ? "POST" : "DELETE", path);
-      const word = what === "cancel" ? "were asked to stop" : "were deleted";
+      const word = what === "cancel" ? "are being canceled" : "were deleted";
       this.app.say(`${format.count(answer.changed)} of ${format.counted(answer.matched, "job")} ${word}.`);
       this.selected.clear();
       this.all = false;
+      if (what === "delete") return this.read();
     } catch (error) {
       this.app.say(String(/** @type {Error} */ (error).message));
     }
     this.draw();
+  }
+
+  /** The moment after the newest job that may be seen: in another order than that of their age, now. */
+  newest() {
+    const newest = this.query.get("order_by") ? Date.now() : Math.max(...this.rows.map((row) => Date.parse(row.created_at)));
+    return new Date(newest + 1).toISOString();
   }
 
   total() {
@@ -332,7 +368,7 @@ class JobList {
       ${this.drawCounts()} ${this.drawFilters()} ${this.drawSelection()}
       ${this.error ? parts.errorBox(this.error, () => this.read()) : nothing}
       ${this.fresh.size
-        ? html`<button type="button" class="fresh" @click=${() => this.read()}>${format.counted(this.fresh.size, "new job")} ↑</button>`
+        ? html`<button type="button" class="fresh" title="Show them" @click=${() => this.read()}>${format.counted(this.fresh.size, "new job")} ↑</button>`
         : nothing}
       ${this.rows.length || this.stale ? this.drawTable() : this.drawNothing()} ${this.drawEnd()}`;
   }
@@ -372,8 +408,11 @@ class JobList {
         event.preventDefault();
         const text = /** @type {HTMLInputElement} */ (/** @type {HTMLFormElement} */ (event.target).elements.namedItem("text")).value;
         this.search(text);
+        /** @type {HTMLFormElement} */ (event.target).reset();
+        this.draw();
       }}>
-      <input type="search" name="text" aria-label="Search jobs" placeholder="name, id, label=value, label!=value" .value=${this.query.get("text") ?? ""} list="label-keys" />
+      <input type="search" name="text" aria-label="Search jobs" placeholder="words, label=value, label!=value; Enter" .value=${this.query.get("text") ?? ""} list="label-keys"
+        @keydown=${(/** @type {KeyboardEvent} */ event) => event.key === "Escape" && this.goTo((query) => query.delete("text"))} />
       <datalist id="label-keys">${this.keys.map(([key, jobs]) => html`<option value="${key}=">${jobs} jobs</option>`)}</datalist>
       ${chips.map((chip) => html`<a class="chip on" href=${remove(chip)} title="Remove this filter">${shown(chip)} <span aria-hidden="true">×</span></a>`)}
       <label class="quiet">Trust <select @change=${(/** @type {Event} */ event) => {
@@ -408,8 +447,9 @@ class JobList {
         }
         const [, key = "", not = "", value = ""] = found;
         const name = key.replace(/^label\./, "");
-        if (FILTERS.includes(name) && !not) query.set(name, value);
-        else query.append(`label.${name}${not}`, value);
+        if (FILTERS.includes(name) && not) this.app.say(`${name} cannot be excluded: only labels can.`);
+        else if (FILTERS.includes(name)) query.set(name, value);
+        else if (!query.getAll(`label.${name}${not}`).includes(value)) query.append(`label.${name}${not}`, value);
       }
       if (rest.length) query.set("text", rest.join(" "));
     });
@@ -431,7 +471,7 @@ class JobList {
         : nothing}
       <a class="button" href=${compare}>Compare</a>
       ${this.app.may("cancel")
-        ? html`<button type="button" @click=${() => this.change("cancel")}>Stop</button>
+        ? html`<button type="button" @click=${() => this.change("cancel")}>Cancel</button>
             <button type="button" @click=${() => this.change("delete")}>Delete …</button>`
         : nothing}
       <button type="button" class="link" @click=${() => {
@@ -452,8 +492,8 @@ class JobList {
           this.rows.forEach((row) => this.select(row.id, on));
         }} /></th>
         <th scope="col">Status</th><th scope="col">Name</th><th scope="col" class="wide">Labels</th><th scope="col">Trust</th>
-        <th scope="col">Convergence</th><th scope="col" class="number wide">Normal force</th><th scope="col" class="number wide">Ran</th>
-        <th scope="col" class="number wide">Age</th>${this.app.me.owner === "local" ? nothing : html`<th scope="col" class="wide">Owner</th>`}
+        <th scope="col">Convergence</th><th scope="col" class="number wide">Normal force</th><th scope="col" class="number wide"><a href=${this.to((query) => query.set("order_by", this.query.get("order_by") === "run_s desc" ? "run_s asc" : "run_s desc"))}>Ran</a></th>
+        <th scope="col" class="number wide"><a href=${this.to((query) => (this.query.get("order_by") === "created_at asc" ? query.delete("order_by") : query.set("order_by", "created_at asc")))}>Age</a></th>${this.app.me.owner === "local" ? nothing : html`<th scope="col" class="wide">Owner</th>`}
       </tr></thead>
       <tbody>${repeat(this.rows, (/** @type {Job} */ row) => row.id, (/** @type {Job} */ row, /** @type {number} */ place) => this.drawRow(row, place))}</tbody>
     </table></div>`;
@@ -467,35 +507,38 @@ class JobList {
     const picked = this.all || this.selected.has(job.id);
     const gone = this.gone.has(job.id);
     const label = (/** @type {string} */ key, /** @type {string} */ value, /** @type {boolean} */ exclude) =>
-      this.to((query) => query.append(`label.${key}${exclude ? "!" : ""}`, value));
+      this.to((query) => {
+        const name = `label.${key}${exclude ? "!" : ""}`;
+        if (!query.getAll(name).includes(value)) query.append(name, value);
+      });
     const running = job.status === "running";
     const since = running && job.started_at ? (Date.now() - Date.parse(job.started_at)) / 1000 : job.run_s;
     return html`<tr class="${picked ? "picked" : ""} ${gone ? "gone" : ""} ${place === this.at ? "at" : ""}">
       <td><input type="checkbox" aria-label="Select ${job.name ?? job.id}" .checked=${picked} @change=${(/** @type {Event} */ event) =>
         this.select(job.id, /** @type {HTMLInputElement} */ (event.target).checked)} /></td>
       <td class="status">${parts.statusBadge(job.status)}${job.attempt > 1 ? html`<span class="note" title="It was started ${job.attempt} times"> ×${job.attempt}</span>` : nothing}</td>
-      <td class="name"><a href=${parts.jobAddress(job.id)}>${job.name ?? shortId(job.id)}</a>${job.pinned ? html` <span title="Kept permanently" aria-label="pinned">📌</span>` : nothing}
+      <td class="name"><a href=${parts.jobAddress(job.id)}>${job.name ?? shortId(job.id)}</a>${job.pinned ? html` <span title="Pinned: it is kept, however old" role="img" aria-label="pinned">★</span>` : nothing}
         ${job.sweep ? html`<a class="chip" href=${address(`sweeps/${job.sweep}`)}>sweep</a>` : nothing}</td>
       <td class="labels">${parts.labelChips(job.labels, label)}</td>
       <td class="trust">${gone ? html`<span class="note">no longer in this list</span>` : parts.trustBadge(job)}</td>
       <td class="curve">${this.drawConvergence(job)}</td>
-      <td class="number wide">${parts.mainNumber(job)}</td>
-      <td class="number wide">${format.duration(since)}</td>
-      <td class="number wide">${parts.age(job.created_at)}</td>
-      ${this.app.me.owner === "local" ? nothing : html`<td class="wide">${job.owner}</td>`}
+      <td class="number force">${parts.mainNumber(job)}</td>
+      <td class="number ran">${format.duration(since)}</td>
+      <td class="number age">${parts.age(job.created_at)}</td>
+      ${this.app.me.owner === "local" ? nothing : html`<td class="owner">${job.owner}</td>`}
     </tr>`;
   }
 
   /** @param {Job} job */
   drawConvergence(job) {
     if (job.status === "queued") return html`<span class="note">${format.waits(job.queue)}</span>`;
-    if (job.status === "canceled") return html`<span class="note">stopped</span>`;
+    if (job.status === "canceled") return html`<span class="note">canceled</span>`;
     const curve = parts.sparkline(job.progress);
     if (job.status === "failed" && curve === nothing) return html`<span class="note">${format.words(job.reason ?? "failed")}</span>`;
     if (job.cached_from) return html`<span class="note">answered from an earlier result</span>`;
     if (job.status === "running" && curve === nothing) {
       const mesh = job.progress?.mesh ? `, mesh ${job.progress.mesh}` : "";
-      return html`<span class="note">${job.cancel_requested ? "is asked to stop" : `${job.progress?.stage ?? "starts"}${mesh}`}</span>`;
+      return html`<span class="note">${job.cancel_requested ? "is being canceled" : `${job.progress?.stage ?? "starts"}${mesh}`}</span>`;
     }
     return curve;
   }
@@ -504,7 +547,7 @@ class JobList {
     if (this.filters().toString()) return html`<p class="empty">No job matches. <a href="#/jobs">Show all jobs</a></p>`;
     return html`<section class="empty"><h2>There are no jobs yet</h2>
       ${this.app.may("submit") ? html`<p><a class="button primary" href=${address("new")}>Try an example</a></p>` : nothing}
-      <p>Or from a shell: <code>signorini submit problem.json --watch</code></p></section>`;
+      ${this.app.may("submit") ? html`<p>Or from a shell: <code>signorini submit problem.json --watch</code></p>` : html`<p>You see the jobs of ${this.app.me.owner} alone, and your token may not submit any.</p>`}</section>`;
   }
 
   drawEnd() {

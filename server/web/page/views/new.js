@@ -23,15 +23,26 @@ const CONTROLS = [
   [/^\/contacts\/\d+\/tangential_force$/, "tangential force"],
   [/^\/contacts\/\d+\/tilt$/, "tilt"],
   [/^\/contacts\/\d+\/gap\/(interference|clearance)$/, "gap"],
-  [/^\/contacts\/\d+\/obstacle\/(radius|angle|slope|half_width)$/, "obstacle"],
+  [/^\/contacts\/\d+\/obstacle\/radius$/, "radius of the obstacle"],
+  [/^\/contacts\/\d+\/obstacle\/angle$/, "angle of the obstacle (degrees)"],
+  [/^\/contacts\/\d+\/obstacle\/slope$/, "slope of the obstacle"],
+  [/^\/contacts\/\d+\/obstacle\/from$/, "obstacle from"],
+  [/^\/contacts\/\d+\/obstacle\/to$/, "obstacle to"],
   [/^\/contacts\/\d+\/friction\/coefficient$/, "coefficient μ"],
   [/^\/contacts\/\d+\/friction\/nonlocal_radius$/, "nonlocal radius ρ"],
   [/^\/contacts\/\d+\/friction\/elastic_slip$/, "elastic slip ε"],
   [/^\/materials\/\d+\/youngs_modulus$/, "Young's modulus E"],
   [/^\/materials\/\d+\/poissons_ratio$/, "Poisson's ratio ν"],
   [/^\/loads\/\d+\/pressure$/, "pressure"],
-  [/^\/mesh\/refine$/, "refinement"],
-  [/^\/mesh\/refine\/tolerance$/, "tolerance of the refinement"],
+  [/^\/mesh\/refine$/, "halvings of all elements"],
+  [/^\/mesh\/refine\/tolerance$/, "refine until errors are below"],
+];
+
+/** What a click on a boundary can do: the list, the words, and the entry. @type {["supports" | "contacts" | "loads", string, string, object][]} */
+const ENTRIES = [
+  ["supports", "hold it", "release it", { ux: 0, uy: 0 }],
+  ["contacts", "press on it", "take the obstacle away", { obstacle: { kind: "flat" }, indentation: 0.01 }],
+  ["loads", "load it", "take the load away", { pressure: 1 }],
 ];
 
 /**
@@ -65,9 +76,12 @@ class NewView {
   error = null;
   /** @type {import("../types").Example[]} */
   examples = [];
+  /** What was typed into a control and cannot be read, by its pointer: the text, and what is wrong. @type {Map<string, {text: string, fault: string}>} */
+  faults = new Map();
   /** Values that vary in a sweep, by their pointers. @type {Map<string, number[]>} */
   varied = new Map();
   busy = "";
+  told = "";
   name = "";
   labels = "";
   priority = "";
@@ -121,7 +135,7 @@ class NewView {
         this.setProblem(withoutDefaults(problem));
       }
       const mesh = query.get("mesh");
-      if (mesh) this.useMesh(await getSurely(`v1/meshes/${mesh}`, signal));
+      if (mesh) await this.useMesh(await getSurely(`v1/meshes/${mesh}`, signal));
       /** @type {import("../types").Examples} */
       const { examples } = await getSurely("v1/examples", signal);
       this.examples = examples;
@@ -167,6 +181,7 @@ class NewView {
   /** @param {unknown} problem */
   setProblem(problem) {
     this.varied.clear();
+    this.faults.clear();
     this.notes = [];
     this.error = null;
     this.setText(pretty(problem));
@@ -293,6 +308,7 @@ class NewView {
   /** @param {File} file */
   async openFile(file) {
     this.error = null;
+    this.told = "";
     this.busy = `Reading ${file.name}`;
     this.draw();
     try {
@@ -341,18 +357,20 @@ class NewView {
   }
 
   /** @param {import("../types").MeshInfo} info */
-  useMesh(info) {
+  async useMesh(info) {
     const names = Object.keys(info.boundaries);
     this.setProblem({
       analysis: { kind: "plane_strain" },
       mesh: { stored: info.hash },
       materials: [{ youngs_modulus: 210000, poissons_ratio: 0.3 }],
-      supports: names[0] ? [{ boundary: names[0], ux: 0, uy: 0 }] : [],
+      supports: [],
       contacts: [],
     });
     this.notes = info.warnings;
     this.boundaries = names;
-    this.app.say(`The mesh is stored: ${format.counted(info.nodes, "node")}, boundaries ${names.join(", ") || "none"}. Click one in the picture.`);
+    this.told = `The mesh is stored: ${format.counted(info.nodes, "node")}. Nothing is held or pressed yet: click a boundary in the picture. E = 210000 and ν = 0.3 are assumed: correct them.`;
+    this.drawing?.setBody(await getView(`v1/meshes/${info.hash}/view`, { signal: this.closed.signal }));
+    this.draw();
   }
 
   /**
@@ -367,13 +385,40 @@ class NewView {
     this.setText(pretty(this.problem));
   }
 
+  /**
+   * Whether a list has an entry for a boundary.
+   * @param {"supports" | "loads" | "contacts"} list
+   * @param {string} boundary
+   */
+  has(list, boundary) {
+    return (this.base()?.[list] ?? []).some((/** @type {any} */ entry) => entry?.boundary === boundary);
+  }
+
+  /**
+   * Takes the entries for a boundary away.
+   * @param {"supports" | "loads" | "contacts"} list
+   * @param {string} boundary
+   */
+  remove(list, boundary) {
+    const base = this.base();
+    base[list] = base[list].filter((/** @type {any} */ entry) => entry?.boundary !== boundary);
+    this.setText(pretty(this.problem));
+  }
+
   async submit() {
     const base = this.base();
     if (!base || this.busy) return;
+    const pairs = this.labels.split(/[\s,]+/).filter(Boolean);
+    const wrong = pairs.find((pair) => !/^[^=]+=./.test(pair));
+    if (wrong) {
+      this.error = new Error(`A label is key=value, such as study=depth, without spaces; "${wrong}" is none.`);
+      this.draw();
+      return;
+    }
     this.busy = "Submitting";
     this.error = null;
     this.draw();
-    const labels = Object.fromEntries(this.labels.split(/[\s,]+/).filter(Boolean).map((pair) => {
+    const labels = Object.fromEntries(pairs.map((pair) => {
       const [key = "", ...value] = pair.split("=");
       return [key, value.join("=")];
     }));
@@ -402,7 +447,8 @@ class NewView {
       } else {
         this.error = error;
       }
-      this.key = newKey();
+      // a request whose answer was lost may have been accepted: the same key finds its job
+      if (error instanceof ApiError) this.key = newKey();
     }
     this.busy = "";
     if (!this.closed.signal.aborted) this.draw();
@@ -444,6 +490,7 @@ class NewView {
         }} /></label> or drop it here</p>
       ${this.busy ? parts.loading(this.busy) : nothing}
       ${this.error ? parts.errorBox(this.error) : nothing}
+      ${this.told ? html`<p class="box" role="status">${this.told}</p>` : nothing}
       ${this.notes.map((note) => html`<p class="box warning">${note.message}</p>`)}
       <div class="columns">
         <div>
@@ -452,7 +499,7 @@ class NewView {
         </div>
         <div>
           ${this.drawSubmit()}
-          <section class="panel"><h2>Picture</h2>${this.drawable ? nothing : html`<p class="note">The problem cannot be drawn yet.</p>`}<div id="picture"></div>
+          <section class="panel"><h2>Picture</h2>${this.drawable && (!this.checked || this.checked.valid) ? nothing : html`<p class="note">The picture is of what could be drawn last, not of the problem as it stands.</p>`}<div id="picture"></div>
             <p class="readout" id="picture-readout"></p>${this.drawBoundary()}</section>
           ${this.drawFindings()}
         </div>
@@ -468,7 +515,8 @@ class NewView {
     };
     return html`<section class="panel"><h2>Submit</h2>
       ${checked?.description ? html`<p>${checked.description}</p>` : nothing}
-      <p class="note">${this.malformed ? html`<strong>The text is no JSON:</strong> ${this.malformed}` : checked?.estimate ? this.drawEstimate(checked) : ""}</p>
+      <p class="note">${this.malformed ? html`<strong>The text is no JSON:</strong> ${this.malformed}` : checked?.valid && checked.estimate ? this.drawEstimate(checked) : ""}</p>
+      ${members > 1 ? html`<p class="note">${format.counted(members, "member")}: ${[...this.varied].map(([pointer, values]) => `${pointer} = ${values.join(", ")}`).join("; ")}. The sentence and the estimate are those of the first.</p>` : nothing}
       <form class="plain-form" @submit=${(/** @type {Event} */ event) => {
         event.preventDefault();
         this.submit();
@@ -476,10 +524,10 @@ class NewView {
         <label>Name <input name="name" .value=${this.name} @input=${field("name")} maxlength="256" /></label>
         <label>Labels <input name="labels" .value=${this.labels} @input=${field("labels")} placeholder="study=radius part=a" /></label>
         ${this.app.may("admin") ? html`<label>Priority <input name="priority" type="number" min="-10" max="10" .value=${this.priority} @input=${field("priority")} /></label>` : nothing}
-        <label>Earlier results <select @change=${(/** @type {Event} */ event) => {
+        <label>If it was solved before <select @change=${(/** @type {Event} */ event) => {
           this.cache = /** @type {HTMLSelectElement} */ (event.target).value;
-        }}><option value="use">may answer</option><option value="refresh">are made anew</option></select></label>
-        <button class="primary" ?disabled=${!this.problem || Boolean(this.busy) || (checked !== null && !checked.valid)}>${word}</button>
+        }}><option value="use">take that result</option><option value="refresh">solve it again</option></select></label>
+        <button class="primary" ?disabled=${!this.problem || Boolean(this.busy) || this.faults.size > 0 || (checked !== null && !checked.valid)}>${word}</button>
       </form></section>`;
   }
 
@@ -505,10 +553,9 @@ class NewView {
   drawBoundary() {
     if (!this.boundary) return this.boundaries.length ? html`<p class="note">Boundaries: ${this.boundaries.join(", ")}. Click one.</p>` : nothing;
     const boundary = this.boundary;
-    return html`<p>Boundary <strong>${boundary}</strong>:
-      <button type="button" class="small" @click=${() => this.add("supports", { boundary, ux: 0, uy: 0 })}>hold it</button>
-      <button type="button" class="small" @click=${() => this.add("contacts", { boundary, obstacle: { kind: "flat" }, indentation: 0.01 })}>press on it</button>
-      <button type="button" class="small" @click=${() => this.add("loads", { boundary, pressure: 1 })}>load it</button></p>`;
+    return html`<p>Boundary <strong>${boundary}</strong>: ${ENTRIES.map(([list, word, without, entry]) => this.has(list, boundary)
+        ? html`<button type="button" class="small on" @click=${() => this.remove(list, boundary)}>${without}</button> `
+        : html`<button type="button" class="small" @click=${() => this.add(list, { boundary, ...entry })}>${word}</button> `)}</p>`;
   }
 
   drawControls() {
@@ -526,8 +573,23 @@ class NewView {
     const several = (/** @type {string} */ own) => /\/(\d+)\//.exec(own)?.[1];
     return html`<section class="panel"><h2>What people change</h2><div class="controls">${found.slice(0, 40).map(
       ([own, label, value]) => html`<label>${label}${Number(several(own)) > 0 ? ` ${Number(several(own)) + 1}` : ""}
-        <input .value=${this.varied.get(own)?.join(", ") ?? String(value)} inputmode="decimal" @change=${(/** @type {Event} */ event) => this.changed(own, /** @type {HTMLInputElement} */ (event.target).value)} /></label>`,
-    )}</div><p class="note">Several values, such as <code>0.1, 0.2, 0.3</code>, make a sweep: all of them are solved, as one table.</p></section>`;
+        <input .value=${this.faults.get(own)?.text ?? this.varied.get(own)?.join(", ") ?? String(value)} aria-invalid=${this.faults.has(own)} inputmode="decimal" @change=${(/** @type {Event} */ event) => this.changed(own, /** @type {HTMLInputElement} */ (event.target).value)} />${this.faults.has(own) ? html`<span class="fault" role="alert">${this.faults.get(own)?.fault}</span>` : nothing}</label>`,
+    )}${this.drawRefine(base)}</div><p class="note">Several values, such as <code>0.1, 0.2, 0.3</code>, make a sweep: all of them are solved, as one table.</p></section>`;
+  }
+
+  /**
+   * A control that has the mesh refined where the errors come from, in a problem whose mesh is not.
+   * @param {any} base
+   */
+  drawRefine(base) {
+    if (!base.mesh || typeof base.mesh !== "object" || base.mesh.refine) return nothing;
+    return html`<label>refine until errors are below
+      <input placeholder="not refined; 0.01 is 1 %" inputmode="decimal" @change=${(/** @type {Event} */ event) => {
+        const read = format.typedNumbers(/** @type {HTMLInputElement} */ (event.target).value);
+        if ("fault" in read) return this.app.say(read.fault);
+        base.mesh.refine = { tolerance: read.numbers[0] };
+        this.setText(pretty(this.problem));
+      }} /></label>`;
   }
 
   /**
@@ -535,15 +597,16 @@ class NewView {
    * @param {string} text
    */
   changed(own, text) {
-    const values = text.split(/[,;\s]+/).filter(Boolean).map(Number);
-    if (!values.length || values.some((value) => !Number.isFinite(value))) {
-      this.app.say(`${text} is no number, and no list of numbers.`);
-    } else if (values.length > 1) {
-      this.varied.set(own, values);
-      this.key = newKey();
+    const read = format.typedNumbers(text);
+    this.key = newKey();
+    if ("fault" in read) {
+      // what was typed stays where it is, and nothing else is submitted in its place
+      this.faults.set(own, { text, fault: read.fault });
     } else {
-      this.varied.delete(own);
-      this.replace(this.prefix() + own, String(values[0]));
+      this.faults.delete(own);
+      if (read.numbers.length > 1) this.varied.set(own, read.numbers);
+      else this.varied.delete(own);
+      this.replace(this.prefix() + own, String(read.numbers[0]));
     }
     this.draw();
   }
@@ -584,8 +647,6 @@ const DEFAULTS = /** @type {Record<string, unknown>} */ ({
   cohesion: 0,
   along: "x",
   condition: "unilateral",
-  refine: 0,
-  tangential_displacement: 0,
 });
 
 /**

@@ -20,6 +20,8 @@ export class ProfilePanel {
   profile = null;
   /** The boundaries that have a profile. @type {string[]} */
   boundaries = [];
+  /** How often a profile was asked for: only the answer to the last question is shown. */
+  reads = 0;
   boundary = "";
   /** @type {Chart | undefined} */
   normal;
@@ -84,11 +86,17 @@ export class ProfilePanel {
 
   async read() {
     if (!this.job || !this.boundary) return;
+    this.reads += 1;
+    const own = this.reads;
     const query = new URLSearchParams({ points: this.points, format: "json" });
     if (this.step >= 0) query.set("step", String(this.step));
     if (this.partial) query.set("partial", "true");
     try {
-      this.profile = await getSurely(`v1/jobs/${this.job.id}/profiles/${encodeURIComponent(this.boundary)}?${query}`, this.closed.signal);
+      /** @type {ContactProfile} */
+      const profile = await getSurely(`v1/jobs/${this.job.id}/profiles/${encodeURIComponent(this.boundary)}?${query}`, this.closed.signal);
+      // another step was asked for meanwhile
+      if (own !== this.reads) return;
+      this.profile = profile;
       this.error = null;
     } catch (error) {
       if (this.closed.signal.aborted) return;
@@ -103,7 +111,7 @@ export class ProfilePanel {
     const summary = this.step >= 0 ? steps[this.step]?.summary : this.result?.summary;
     const contact = summary?.contacts[this.boundary];
     const states = this.profile?.state ?? [];
-    const cut = this.profile ? robustRange([this.profile.normal_stress]).cut : false;
+    const cut = this.profile ? robustRange([this.profile.normal_stress], this.profile.s).cut : false;
     render(
       html`<h2>Stress along the contact "${this.boundary}" ${this.result?.result_available === "partial" && !this.partial ? html`<span class="note">so far</span>` : nothing}</h2>
         <div class="tools">
@@ -130,8 +138,8 @@ export class ProfilePanel {
         <div id="tangential-stress" ?hidden=${!this.hasFriction()}></div>
         <p class="readout" id="profile-readout" .textContent=${this.told ?? ""}></p>
         <p class="legend"><span><i></i>normal stress σₙ</span>${this.hasFriction() ? html`<span class="c2"><i></i>tangential stress σₜ</span><span class="old"><i></i>friction bound ± τ</span>${states.includes("stick") ? html`<span class="stick"><i></i>sticks</span>` : nothing}${states.includes("slip") ? html`<span class="slip"><i></i>slips</span>` : nothing}` : html`<span class="slip"><i></i>in contact</span>`}</p>
-        ${cut ? html`<p class="note">▼ The axis leaves out values that are far beyond the others, as at an edge where the pressure has no limit. Drag to zoom, double click to see all.</p>` : html`<p class="note">Drag to zoom, double click to see all.</p>`}
-        ${contact ? html`<p class="note">In contact ${intervals(contact.contact)}${contact.stick.length ? `; sticks ${intervals(contact.stick)}` : ""}.</p>` : nothing}
+        ${cut ? html`<p class="note">▼ The axis leaves out values that are far beyond the others, as at an edge where the pressure has no limit. Drag to zoom, double click to see the whole boundary.</p>` : html`<p class="note">Drag to zoom, double click to see the whole boundary.</p>`}
+        ${contact ? html`<p class="note">s is the arc length along the boundary. In contact ${intervals(contact.contact)}${contact.stick.length ? `; sticks ${intervals(contact.stick)}` : ""}.</p>` : nothing}
         ${this.drawTable()}`,
       this.root,
     );
@@ -148,10 +156,11 @@ export class ProfilePanel {
     const read = (/** @type {number | null} */ place) => this.read_(profileAt(this.profile, place));
     const few = profile.s.length < 80;
     const shades = shadesOf(profile);
-    this.normal ??= new Chart(find("normal-stress"), { label: "Normal stress along the contact", x: "", y: "normal stress", robust: true, height: 220, sync: "profile", read });
+    const first = this.firstPart(profile);
+    this.normal ??= new Chart(find("normal-stress"), { label: "Normal stress along the contact", x: "", y: "normal stress", robust: true, height: 220, sync: "profile", read, ...first });
     this.normal.set([{ label: "normal stress", color: "--curve-1", points: few, x: profile.s, y: profile.normal_stress }], shades);
     if (!this.hasFriction()) return;
-    this.tangential ??= new Chart(find("tangential-stress"), { label: "Tangential stress along the contact", x: "arc length s", y: "tangential stress", robust: true, height: 220, sync: "profile", read });
+    this.tangential ??= new Chart(find("tangential-stress"), { label: "Tangential stress along the contact", x: "arc length s", y: "tangential stress", robust: true, height: 220, sync: "profile", read, ...first });
     this.tangential.set(
       [
         { label: "bound", color: "--curve-old", width: 1, dash: [4, 3], x: profile.s, y: profile.friction_bound },
@@ -160,6 +169,19 @@ export class ProfilePanel {
       ],
       shades,
     );
+  }
+
+  /**
+   * The part of the boundary that is shown at first: the contact with as much beside it, if that is a small part.
+   * @param {ContactProfile} profile
+   * @returns {{first?: [number, number]}}
+   */
+  firstPart(profile) {
+    const touching = profile.s.filter((_, n) => profile.state[n] !== "open");
+    const [start = 0, end = 0] = [profile.s[0], profile.s[profile.s.length - 1]];
+    const [from = start, to = end] = [touching[0], touching[touching.length - 1]];
+    const width = Math.max(to - from, 0);
+    return width > 0 && 3 * width < end - start ? { first: [Math.max(start, from - width), Math.min(end, to + width)] } : {};
   }
 
   /** @param {string} told */
@@ -176,7 +198,7 @@ export class ProfilePanel {
     const rows = [...profile.s.keys()].filter((n) => n % every === 0);
     return html`<details><summary>The values as a table${every > 1 ? `, one row in ${every} of ${profile.s.length}` : ""}</summary><div class="scroll"><table class="numbers">
       <thead><tr>${["s", "x", "y", "gap", "σₙ", "σₜ", "τ", "state"].map((name) => html`<th scope="col" class="number">${name}</th>`)}</tr></thead>
-      <tbody>${rows.map((n) => html`<tr>${[profile.s, profile.x, profile.y, profile.gap, profile.normal_stress, profile.tangential_stress, profile.friction_bound].map((column) => html`<td class="number">${format.number(column[n])}</td>`)}<td class="number">${profile.state[n]}</td></tr>`)}</tbody>
+      <tbody>${rows.map((n) => html`<tr>${[profile.s, profile.x, profile.y, profile.gap, profile.normal_stress, profile.tangential_stress, profile.friction_bound].map((column) => html`<td class="number">${format.number(column[n])}</td>`)}<td class="number">${stateOf(profile, n)}</td></tr>`)}</tbody>
     </table></div></details>`;
   }
 }
@@ -184,6 +206,16 @@ export class ProfilePanel {
 /** @param {number[][]} pairs */
 function intervals(pairs) {
   return pairs.slice(0, 4).map(([from, to]) => `from s = ${format.number(from)} to ${format.number(to)}`).join(", ") + (pairs.length > 4 ? ` and ${pairs.length - 4} more` : "");
+}
+
+/**
+ * The state at a point; without friction what touches neither sticks nor slips.
+ * @param {ContactProfile} profile
+ * @param {number} place
+ */
+function stateOf(profile, place) {
+  const state = profile.state[place] ?? "";
+  return state !== "open" && !profile.friction_bound.some((bound) => bound > 0) ? "in contact" : state;
 }
 
 /**
@@ -195,7 +227,7 @@ function profileAt(profile, place) {
   if (!profile || place === null || place >= profile.s.length) return "";
   const at = (/** @type {number[]} */ column) => format.number(column[place]);
   const friction = (profile.friction_bound[place] ?? 0) > 0 ? `, σₜ = ${at(profile.tangential_stress)}, τ = ${at(profile.friction_bound)}` : "";
-  return `s = ${at(profile.s)}: σₙ = ${at(profile.normal_stress)}${friction}, ${profile.state[place]}`;
+  return `s = ${at(profile.s)}: σₙ = ${at(profile.normal_stress)}${friction}, ${stateOf(profile, place)}`;
 }
 
 /**

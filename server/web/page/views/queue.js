@@ -27,6 +27,9 @@ export function open(root, _here, app) {
 class QueueView {
   /** @type {import("../types").QueueState | null} */
   queue = null;
+  /** The caller, as of now. @type {import("../types").Me | null} */
+  me = null;
+  begun = false;
   /** @type {import("../types").Forecast | null} */
   forecast = null;
   /** @type {import("../types").Info | null} */
@@ -57,7 +60,6 @@ class QueueView {
     app.title("Queue");
     this.clock = setInterval(() => this.draw(), 2000);
     this.draw();
-    this.read();
     this.unfollow = follow((after) => `v1/events?status=running&fields=${FIELDS}${after ? `&after=${encodeURIComponent(after)}` : ""}`, "", {
       event: (event) => this.told(event),
     });
@@ -73,6 +75,11 @@ class QueueView {
 
   /** @param {any} event */
   told(event) {
+    // after the stream has begun: nothing that changes meanwhile is missed
+    if (!this.begun) {
+      this.begun = true;
+      this.read();
+    }
     switch (event.type) {
       case "queue":
         this.queue = event.queue;
@@ -102,7 +109,14 @@ class QueueView {
 
   async readWaiting() {
     const { signal } = this.closed;
-    this.forecast = await getSurely("v1/queue/waiting", signal).catch(() => this.forecast);
+    const quietly = (/** @type {string} */ path, /** @type {any} */ before) => getSurely(path, signal).catch(() => before);
+    const admin = this.app.may("admin");
+    const [forecast, me, owners] = await Promise.all([
+      quietly("v1/queue/waiting", this.forecast),
+      quietly("v1/me", this.me),
+      admin ? quietly("v1/owners", { owners: this.owners }) : { owners: [] },
+    ]);
+    Object.assign(this, { forecast, me, owners: owners.owners });
     if (!signal.aborted) this.draw();
   }
 
@@ -182,7 +196,7 @@ class QueueView {
 
   drawRunning() {
     const jobs = [...this.running.values()];
-    if (!jobs.length) return html`<p class="note">Nothing runs.</p>`;
+    if (!jobs.length) return html`<p class="note">${this.queue?.running && !this.app.may("admin") ? "Nothing of yours runs." : "Nothing runs."}</p>`;
     return html`<div class="table-box"><table><tbody>${jobs.map((job) => {
       const progress = job.progress;
       const since = job.started_at ? (Date.now() - Date.parse(job.started_at)) / 1000 : null;
@@ -193,8 +207,8 @@ class QueueView {
   }
 
   drawWaiting() {
-    const waiting = this.forecast?.waiting ?? [];
-    if (!waiting.length) return html`<p class="note">Nothing waits.</p>`;
+    const waiting = (this.forecast?.waiting ?? []).filter((job) => !this.running.has(job.id));
+    if (!waiting.length) return html`<p class="note">${this.queue?.queued && !this.app.may("admin") ? "Nothing of yours waits." : "Nothing waits."}</p>`;
     return html`<div class="table-box"><table><thead><tr><th scope="col">Job</th><th scope="col">Why it waits</th><th scope="col" class="number">Starts in about</th></tr></thead>
       <tbody>${waiting.map((job) => html`<tr><td class="name"><a href=${parts.jobAddress(job.id)}>${job.name ?? `…${job.id.slice(-8)}`}</a>${job.owner === "local" ? nothing : html` <span class="note">${job.owner}</span>`}</td>
         <td>${format.waits({ position: job.position, ahead: job.position - 1, reason: job.reason })}</td><td class="number">${job.starts_in_s === null ? "—" : format.duration(job.starts_in_s)}</td></tr>`)}</tbody></table></div>`;
@@ -208,15 +222,15 @@ class QueueView {
       <dt>workers</dt><dd>${info.workers}, in ${info.isolation === "process" ? "processes of their own" : "threads"}</dd>
       <dt>disk</dt><dd>${format.bytes(disk.used_bytes)} used, ${format.bytes(disk.free_bytes)} free</dd>
       <dt>memory for jobs</dt><dd>${format.bytes(limits.memory_budget_bytes)}</dd>
-      <dt>kept bodies</dt><dd>${cache.bodies} (${format.bytes(cache.bytes)}), used ${format.count(cache.hits)} times</dd>
+      <dt>factored bodies, kept for later jobs</dt><dd>${cache.bodies} (${format.bytes(cache.bytes)}), used ${format.count(cache.hits)} times</dd>
       <dt>largest request</dt><dd>${format.bytes(limits.max_body_bytes)}; a mesh ${format.bytes(limits.max_mesh_bytes)}</dd>
       <dt>results are kept</dt><dd>${keptFor(info.retention)}</dd></dl>`;
   }
 
   drawMe() {
-    const { me } = this.app;
+    const me = this.me ?? this.app.me;
     const of = (/** @type {{used: number, limit: number | null}} */ { used, limit }, /** @type {(n: number) => string} */ shown) => `${shown(used)}${limit === null ? "" : ` of ${shown(limit)}`}`;
-    return html`<section class="panel"><h2>You</h2><dl class="facts"><dt>name</dt><dd>${me.owner}</dd><dt>may</dt><dd>${me.scopes.join(", ")}</dd>
+    return html`<section class="panel"><h2>You, and your limits</h2><dl class="facts"><dt>name</dt><dd>${me.owner}</dd><dt>may</dt><dd>${me.scopes.join(", ")}</dd>
       <dt>waiting jobs</dt><dd>${of(me.queued, format.count)}</dd><dt>running jobs</dt><dd>${of(me.running, format.count)}</dd><dt>stored</dt><dd>${of(me.stored_bytes, format.bytes)}</dd></dl></section>`;
   }
 
@@ -234,6 +248,7 @@ class QueueView {
       <tbody>${this.tokens.filter(valid).map((token) => html`<tr><td>${token.name}</td><td>${token.owner}</td><td>${token.scopes.join(", ")}</td><td>${token.expires_at ? format.exactly(token.expires_at) : "no end"}</td>
         <td><button type="button" class="small" @click=${() => confirm(`Revoke the token ${token.name} of ${token.owner}?`) && this.act(async () => {
           await send("DELETE", `v1/tokens/${token.id}`);
+          this.secret = "";
           await this.readAdministration();
         })}>Revoke</button></td></tr>`)}</tbody></table></div>
       <form class="plain-form" @submit=${(/** @type {SubmitEvent} */ event) => {
@@ -249,7 +264,7 @@ class QueueView {
           await this.readAdministration();
         });
       }}>
-        <label>Name <input name="name" required maxlength="64" /></label><label>Owner <input name="owner" required pattern="[A-Za-z0-9._@+\\-]+" maxlength="64" /></label>
+        <label>Name, for people <input name="name" required maxlength="64" /></label><label>Owner, whose jobs it sees <input name="owner" required pattern="[A-Za-z0-9._@+\\-]+" maxlength="64" title="letters, digits and . _ @ + -" /></label>
         <fieldset><legend>May</legend>${["read", "submit", "cancel", "admin"].map((scope) => html`<label><input type="checkbox" name="scope" value=${scope} ?checked=${scope !== "admin"} /> ${scope}</label> `)}</fieldset>
         <label>Days <input name="days" type="number" min="1" placeholder="no end" /></label><button>Make a token</button></form></section>`;
   }
@@ -268,5 +283,5 @@ function keptFor({ days, fields_days, bytes, bytes_per_owner, jobs, jobs_per_own
     jobs && `at most ${format.counted(jobs, "job")}`,
     jobs_per_owner && `${format.counted(jobs_per_owner, "job")} of each owner`,
   ].filter(Boolean);
-  return limits.length ? limits.join("; ") : "without a limit";
+  return limits.length ? `${limits.join("; ")}. Beyond that the oldest that are not pinned are removed` : "without a limit";
 }

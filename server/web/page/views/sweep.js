@@ -5,7 +5,7 @@ import { getSurely, newKey, send } from "../api.js";
 import { Chart } from "../chart.js";
 import * as format from "../format.js";
 import * as parts from "../parts.js";
-import { go } from "../route.js";
+import { address, go } from "../route.js";
 import { follow } from "../stream.js";
 
 /** @typedef {import("../types").Sweep} Sweep */
@@ -54,6 +54,8 @@ class SweepView {
     this.app = app;
     this.id = here.path[1] ?? "";
     this.closed = new AbortController();
+    this.quantity = here.query.get("number") ?? "normal_force";
+    this.picked = Number(here.query.get("member") ?? -1);
     render(parts.loading("Loading the sweep"), root);
     this.load();
   }
@@ -79,7 +81,10 @@ class SweepView {
     // its events are its rows, past ones first
     this.unfollow = follow((after) => `v1/sweeps/${this.id}/events?after_seq=${after}`, "0", {
       event: (event) => {
-        if (event.type === "member") this.members.set(event.member.number, event.member);
+        if (event.type === "member") {
+          this.members.set(event.member.number, event.member);
+          if (this.sweep?.status === "queued") this.sweep = { ...this.sweep, status: "running" };
+        }
         else if (event.type === "done") this.sweep = event.sweep;
         this.drawSoon();
       },
@@ -117,34 +122,38 @@ class SweepView {
     const solved = rows.filter((row) => row.status === "succeeded");
     const names = NUMBERS.filter((name) => solved.some((row) => typeof /** @type {any} */ (row)[name] === "number"));
     const drawable = names.filter((name) => solved.every((row) => hasLimit(row, name)));
+    if (drawable.length && !drawable.includes(this.quantity)) this.quantity = drawable[0] ?? "normal_force";
+    const poor = solved.filter((row) => row.verdict === "poor").length;
     const ended = ["succeeded", "failed", "canceled"].includes(sweep.status);
     render(
       html`<p class="crumbs"><a href="#/sweeps">Sweeps</a> › ${this.id}</p>
         <div class="head"><h1>${this.name()}</h1>${parts.statusBadge(sweep.status)}
-          ${parts.labelChips(sweep.labels, (key, value) => `#/jobs?label.${encodeURIComponent(key)}=${encodeURIComponent(value)}`)}<span class="space"></span>
+          ${Object.entries(sweep.labels).map(([key, value]) => html`<span class="chip">${key}=${value}</span>`)}<span class="space"></span>
           <a class="button" href="v1/sweeps/${this.id}/results?format=csv" download>CSV</a>
           <a class="button" href="#/jobs?sweep=${this.id}">Its jobs</a>
-          ${!ended && this.app.may("cancel") ? html`<button type="button" @click=${() => this.act("POST", "/cancel")}>Stop</button>` : nothing}
+          ${!ended && this.app.may("cancel") ? html`<button type="button" @click=${() => confirm("Cancel the jobs of this sweep?") && this.act("POST", "/cancel")}>Cancel</button>` : nothing}
           ${ended && this.app.may("cancel") ? html`<button type="button" @click=${() => confirm("Delete this sweep, its jobs and its rows?") && this.act("DELETE", "")}>Delete …</button>` : nothing}
         </div>
         ${this.error ? parts.errorBox(this.error) : nothing}
         <p><progress max=${total} value=${rows.length} aria-label="Members that have ended"></progress>
-          <span role="status">${format.count(rows.length)} of ${format.counted(total, "member")}</span>${rows.length - solved.length ? html`, ${format.count(rows.length - solved.length)} without a solution` : nothing}</p>
+          <span role="status">${format.count(rows.length)} of ${format.counted(total, "member")}</span>${poor ? html`, <strong>${format.count(poor)} not to be trusted</strong>` : nothing}${rows.length - solved.length ? html`, ${format.count(rows.length - solved.length)} without a solution` : nothing}</p>
         <section class="panel" ?hidden=${!solved.length}><h2>${format.words(this.quantity)}</h2>
           <div class="tools"><label>number <select @change=${(/** @type {Event} */ event) => {
             this.quantity = /** @type {HTMLSelectElement} */ (event.target).value;
+            this.remember();
             this.draw();
           }}>${drawable.map((name) => html`<option value=${name} ?selected=${name === this.quantity}>${format.words(name)}</option>`)}</select></label></div>
           ${sweep.paths.length === 2 ? this.drawMap(solved) : nothing}
           <div id="lines" ?hidden=${sweep.paths.length !== 1}></div>
           ${this.drawPicked()}
-          <p class="note">Rows have no errors but those of widths: a member that is solved by itself has them all.</p></section>
+          <p class="note">The rows state no errors. Solve a member as a job to get the errors of its numbers, its profile and its fields.</p></section>
         <section class="panel"><h2>Table</h2><div class="table-box"><table class="numbers">
-          <thead><tr><th scope="col" class="number">n</th>${sweep.paths.map((path) => html`<th scope="col" class="number"><code>${path}</code></th>`)}<th scope="col">status</th>${names.map((name) => html`<th scope="col" class="number">${format.words(name)}</th>`)}</tr></thead>
+          <thead><tr><th scope="col" class="number">n</th>${sweep.paths.map((path) => html`<th scope="col" class="number"><code>${path}</code></th>`)}<th scope="col">status</th><th scope="col">trust</th>${names.map((name) => html`<th scope="col" class="number">${format.words(name)}</th>`)}</tr></thead>
           <tbody>${rows.slice(0, this.shown).map((row) => html`<tr class=${row.number === this.picked ? "picked" : ""}>
             <td class="number"><button type="button" class="link" @click=${() => this.pick(row.number)}>${row.number}</button></td>
             ${sweep.paths.map((path) => html`<td class="number">${shown(this.value(row, path))}</td>`)}
             <td>${parts.statusBadge(row.status)}${row.detail ? html`<span class="note"> ${row.detail}</span>` : nothing}</td>
+            <td>${row.verdict ? parts.trustBadge({ verdict: row.verdict, quantities: [], warnings: /** @type {any} */ (row.warnings.map((code) => ({ code }))) }) : html`<span class="note" title="Of the members on one body the first and the last have stated errors">not stated</span>`}</td>
             ${names.map((name) => html`<td class="number">${hasLimit(row, name) ? format.number(/** @type {any} */ (row)[name]) : "no limit"}</td>`)}</tr>`)}</tbody></table></div>
           ${rows.length > this.shown ? html`<p>${format.count(this.shown)} of ${format.count(rows.length)} rows. <button type="button" @click=${() => {
             this.shown += 1000;
@@ -158,7 +167,14 @@ class SweepView {
   /** @param {number} number */
   pick(number) {
     this.picked = number;
+    this.remember();
     this.draw();
+  }
+
+  /** Keeps what is chosen in the address. */
+  remember() {
+    const chosen = { number: this.quantity, ...(this.picked >= 0 ? { member: String(this.picked) } : {}) };
+    history.replaceState(null, "", address(`sweeps/${this.id}`, chosen));
   }
 
   drawPicked() {
@@ -232,7 +248,8 @@ class SweepView {
       const part = typeof value === "number" ? (value - least) / (most - least || 1) : 0;
       const text = `${across} = ${shown(xs[x])}, ${up} = ${shown(ys[y])}: ${format.number(value)}`;
       return svg`<rect class="cell" tabindex="0" role="button" aria-label=${text} x=${90 + x * wide} y=${10 + (ys.length - 1 - y) * high} width=${wide - 1} height=${high - 1} fill=${color(part)} stroke=${row.number === this.picked ? "var(--text)" : "none"} stroke-width="2"
-        @click=${() => this.pick(row.number)} @keydown=${(/** @type {KeyboardEvent} */ event) => ["Enter", " "].includes(event.key) && (event.preventDefault(), this.pick(row.number))}><title>${text}</title></rect>`;
+        @click=${() => this.pick(row.number)} @keydown=${(/** @type {KeyboardEvent} */ event) => ["Enter", " "].includes(event.key) && (event.preventDefault(), this.pick(row.number))}><title>${text}</title></rect>
+        ${wide > 56 && high > 20 ? svg`<text class="inside ${part > 0.55 ? "dark" : ""}" x=${90 + (x + 0.5) * wide} y=${14 + (ys.length - 0.5 - y) * high} text-anchor="middle">${format.number(value)}</text>` : nothing}`;
     };
     const every = (/** @type {number} */ count, /** @type {number} */ room) => Math.max(1, Math.ceil(count / room));
     return html`<div class="table-box"><svg class="map" width=${100 + xs.length * wide} height=${60 + ys.length * high} role="group" aria-label="Map of ${this.quantity}">

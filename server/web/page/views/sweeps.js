@@ -44,7 +44,7 @@ export function open(root, _here, app) {
   };
 
   const drawn = () => html`<h1>Sweeps</h1>
-    <p class="note">One problem with many values, solved together. A new one: give several values to a number of a <a href=${address("new")}>new job</a>.</p>
+    <p class="note">One problem with many values, solved together. ${app.may("submit") ? html`A new one: give several values to a number of a <a href=${address("new")}>new job</a>.` : nothing}</p>
     ${error ? parts.errorBox(error, () => read("")) : nothing}
     ${loading ? parts.loading("Loading the sweeps") : nothing}
     ${sweeps.length

@@ -27,7 +27,9 @@ impl Input for Filters {
         // `label.a!=b` is the name `label.a!` and the value `b`
         let excludes = |(key, _): &(String, String)| key.ends_with('!');
         let (excluded, labels) = raw.keyed(LABEL.name).partition(excludes);
-        let named = |(key, value): (String, String)| (key.trim_end_matches('!').to_owned(), value);
+        let named = |(key, value): (String, String)| {
+            (key.strip_suffix('!').unwrap_or(&key).to_owned(), value)
+        };
         let mut filter = Filter {
             labels,
             excluded_labels: Vec::into_iter(excluded).map(named).collect(),

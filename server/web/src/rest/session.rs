@@ -114,7 +114,13 @@ pub(super) async fn create_session(mut call: Call) -> Result<Response, ApiError>
 /// Ends the sessions of a browser with this service: the answer removes their cookies.
 pub(super) async fn delete_session(call: Call) -> Result<Response, ApiError> {
     let mut response = StatusCode::NO_CONTENT.into_response();
-    for token in cookies(&call.headers) {
+    let (store, now) = (&call.service.store, Time::of_the_machine());
+    let own = cookies(&call.headers);
+    // not those of another service at this host
+    for token in own
+        .iter()
+        .filter(|token| store.find_token(token, now).is_some())
+    {
         set(&mut response, &call, &token.id, "", 0)?;
     }
     Ok(response)

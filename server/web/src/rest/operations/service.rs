@@ -1,5 +1,7 @@
 //! The operations for the queue, errors, the description of the API, the page, and the probes.
 
+use std::fmt::Display;
+
 use axum::{
     Json,
     http::header,
@@ -75,8 +77,8 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "The explanation", [json::<Kind>(), bytes("text/html")].concat()),
         get(OPEN, "/v1/warnings/{code}", (WARNING,), get_warning)
             .rest_only("GetWarning")
-            .summary("Explains a warning of a result")
-            .answers(200, "The explanation", json::<WarningKind>()),
+            .summary("Explains a warning of a result, for programs or as a page")
+            .answers(200, "The explanation", [json::<WarningKind>(), bytes("text/html")].concat()),
         get(READ, "/v1/schema/problem.json", (), get_problem_schema)
             .rest_only("GetProblemSchema")
             .summary("Returns the JSON Schema of a problem: every field with its meaning and default")
@@ -186,41 +188,46 @@ const CODE: Variable<Words<Code>> = Variable {
 /// Answers with the explanation of a kind of error: as JSON for programs, or as a page for people.
 async fn get_error(call: Call, code: Code) -> Result<Response, ApiError> {
     let kind = code.kind();
-    let vary = [(header::VARY, "Accept")];
-    if prefers(&call.headers, &["text/html"]) {
-        let html = [
-            (header::CONTENT_TYPE, "text/html; charset=utf-8"),
-            (
-                header::CONTENT_SECURITY_POLICY,
-                "default-src 'none'; style-src 'unsafe-inline'",
-            ),
-        ];
-        return Ok((vary, html, page(&kind)).into_response());
-    }
-    Ok((vary, Json(kind)).into_response())
+    let mut texts: Vec<String> = kind.facts().iter().map(ToString::to_string).collect();
+    texts.push(kind.explanation.to_string());
+    Ok(explained(&call, &kind, kind.code, kind.title, &texts, None))
 }
 
-/// The explanation of a kind of error as a page. Its texts are constants without any character that HTML would
-/// interpret.
-fn page(kind: &Kind) -> String {
-    let Kind {
-        code,
-        title,
-        explanation,
-        ..
-    } = kind;
-    let facts: String = kind
-        .facts()
-        .iter()
-        .map(|fact| format!("<p>{fact}</p>"))
-        .collect();
-    format!(
+/// Answers with an explanation: as a page for a person who follows a link, or as JSON.
+fn explained(
+    call: &Call,
+    kind: &impl Serialize,
+    code: impl Display,
+    title: &str,
+    texts: &[String],
+    picture: Option<&str>,
+) -> Response {
+    let vary = [(header::VARY, "Accept")];
+    if !prefers(&call.headers, &["text/html"]) {
+        return (vary, Json(kind)).into_response();
+    }
+    let html = [
+        (header::CONTENT_TYPE, "text/html; charset=utf-8"),
+        (
+            header::CONTENT_SECURITY_POLICY,
+            "default-src 'none'; style-src 'unsafe-inline'",
+        ),
+    ];
+    let escaped = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;");
+    let texts = texts.iter().map(|text| format!("<p>{}</p>", escaped(text)));
+    let texts: String = texts.collect();
+    let picture = picture.map_or_else(String::new, |picture| {
+        format!("<pre>{}</pre>", escaped(picture))
+    });
+    let title = escaped(title);
+    let page = format!(
         "<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content=\"width=device-width\">\
          <title>{code} – Signorini</title>\
          <style>body{{font:1rem/1.5 system-ui,sans-serif;max-width:40rem;margin:3rem auto;padding:0 1rem}}\
          code{{font-size:1.1em}}</style>\
-         <h1>{title}</h1><p><code>{code}</code></p>{facts}<p>{explanation}</p></html>\n"
-    )
+         <h1>{title}</h1><p><code>{code}</code></p>{texts}{picture}</html>\n"
+    );
+    (vary, html, page).into_response()
 }
 
 /// The variable of a path that names a kind of warning.
@@ -232,8 +239,17 @@ const WARNING: Variable<Words<WarningCode>> = Variable {
 };
 
 /// Answers with the explanation of a kind of warning.
-async fn get_warning(_: Call, code: WarningCode) -> Result<Json<WarningKind>, ApiError> {
-    Ok(Json(catalog::warning(code)))
+async fn get_warning(call: Call, code: WarningCode) -> Result<Response, ApiError> {
+    let kind = catalog::warning(code);
+    let texts = [kind.why, kind.advice].map(str::to_owned);
+    Ok(explained(
+        &call,
+        &kind,
+        kind.code,
+        &kind.title,
+        &texts,
+        kind.picture,
+    ))
 }
 
 /// Returns the JSON Schema of a problem.
