@@ -334,7 +334,7 @@ class NewView {
     if (ending === "inp") {
       const text = await file.text();
       if (/^\s*\*step/im.test(text)) {
-        const answer = await request("v1/problems/convert", { method: "POST", body: text, headers: { "content-type": "text/plain" } });
+        const answer = await request("v1/problems/convert", { method: "POST", body: text, headers: { "content-type": "application/octet-stream" } });
         /** @type {{problem: any, warnings: import("../types").Warning[]}} */
         const { problem, warnings } = await answer.json();
         this.setProblem(await this.withStoredMesh(problem));

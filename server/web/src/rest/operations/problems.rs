@@ -42,7 +42,7 @@ pub(super) fn operations() -> Vec<Operation> {
         post(READ, "/v1/problems/convert", (), convert_deck)
             .rpcs(&["ConvertDeck"])
             .summary("Reads a deck of Abaqus or CalculiX as a problem; violations of what is not understood have their lines; stores nothing")
-            .body(bytes("text/plain"))
+            .body(bytes("application/octet-stream"))
             .answers(200, "The problem, and what the solver treats differently", json::<Converted>())
             .fails(&[Code::InvalidProblem, Code::MalformedJson, Code::PayloadTooLarge]),
         get(READ, "/v1/examples", (), get_examples)
