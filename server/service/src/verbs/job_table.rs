@@ -338,7 +338,7 @@ impl Columns {
     }
 }
 
-/// The scalar values of a problem, by their JSON Pointers; a list of more than [`MOST_ITEMS`] numbers or points is one value.
+/// The scalar values of a problem, by their JSON Pointers; a list of more than three numbers or points is one value.
 pub type Leaves = BTreeMap<String, Value>;
 
 /// The largest problem whose values a table has (bytes): one with a mesh in it is larger, and is left empty.
