@@ -189,8 +189,16 @@ export function newKey() {
  * @returns {Promise<View>}
  */
 export async function getView(path, init = {}) {
-  const response = await request(path, init);
-  return readView(await response.arrayBuffer());
+  for (let attempt = 0; ; attempt += 1) {
+    try {
+      const response = await request(path, init);
+      return readView(await response.arrayBuffer());
+    } catch (error) {
+      // the service draws few large bodies at a time
+      if (!isPassing(error)) throw error;
+    }
+    await sleep(pauseBefore(attempt), init.signal ?? undefined);
+  }
 }
 
 /**

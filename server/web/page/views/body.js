@@ -73,21 +73,24 @@ export class BodyPanel {
     this.draw();
     try {
       const signal = this.closed.signal;
-      const first = this.solved ? ["displacement", "von_mises", "contact_state"] : [];
-      const [view, ...fields] = await Promise.all([
-        getView(`v1/jobs/${job.id}/view${this.query}`, { signal }),
-        ...first.map((name) => this.fetchField(name).catch(() => null)),
-      ]);
+      const first = this.solved ? ["displacement", "von_mises"] : [];
+      const view = await getView(`v1/jobs/${job.id}/view${this.query}`, { signal });
       if (own !== this.loads) return;
       this.view = view;
-      this.solved = this.solved && fields.slice(0, 2).every((field) => field !== null) && fields.length > 0;
+      this.drawing?.setBody(view);
+      this.draw();
+      // one after another: the service reads the fields of a large body for few at a time
+      const fields = [];
+      for (const name of first) fields.push(await this.fetchField(name).catch(() => null));
+      if (own !== this.loads) return;
+      this.solved = this.solved && fields.every((field) => field !== null) && fields.length > 0;
       this.error = null;
       this.loading = false;
       this.field = this.solved ? "von_mises" : "none";
       this.draw();
-      this.drawing?.setBody(view);
       this.showField();
-      this.showContact(true);
+      if (this.solved) await this.fetchField("contact_state").catch(() => null);
+      if (own === this.loads) this.showContact(true);
     } catch (error) {
       if (this.closed.signal.aborted || own !== this.loads) return;
       this.error = error instanceof ApiError || error instanceof Unreachable ? error : new Error("The body cannot be drawn.");
