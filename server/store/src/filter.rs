@@ -14,7 +14,7 @@ use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// All filters except the one by labels, whose name in requests depends on the label. Each line has the field of
 /// [`Filter`], its type, the name in requests (that of the field in the proto), the column and the comparison
-/// ([`Comparison`]), the
+/// (`Comparison`), the
 /// index that lists the jobs of a value in order of arrival, if there is one, and the meaning. `$use` is a macro that
 /// receives the lines.
 #[macro_export]
