@@ -14,9 +14,12 @@ from playwright.sync_api import sync_playwright
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 from outside import check, equal  # noqa: E402
 
-#: What Chromium itself writes when a server is killed, and for an answer that is an error. A page cannot prevent it.
+#: What Chromium itself writes: when a server is killed, and for an answer with one of these statuses: no session, nothing there, a mesh or deck that is refused, a proxy
+#: without a service, a service that starts or is busy. A page cannot prevent it. A request that the page should not have sent,
+#: such as one with status 400, is not among them.
 OF_THE_BROWSER = re.compile(
-    r"^Failed to load resource: |net::ERR_(CONNECTION_REFUSED|INCOMPLETE_CHUNKED_ENCODING|CONNECTION_RESET|EMPTY_RESPONSE)"
+    r"^Failed to load resource: (net::|the server responded with a status of (401|404|422|502|503) )"
+    r"|net::ERR_(CONNECTION_REFUSED|INCOMPLETE_CHUNKED_ENCODING|CONNECTION_RESET|EMPTY_RESPONSE)"
     # the software renderer, when a picture of the page is taken
     r"|GPU stall due to ReadPixels"
 )
