@@ -45,7 +45,7 @@ def run(browser):
         with browser.at(server) as tabs:
             by_keyboard(tabs, server, ids)
         with browser.at(server, reduced_motion="reduce") as tabs:
-            job = server.submit(talkative(1000, refine=2), name="runs")
+            job = server.submit(talkative(2000, refine=5), name="runs")
             page = tabs.page("#/jobs/" + job, "Convergence, live")
             equal(page.evaluate("document.getAnimations().length"), 0, "movements")
             server.call("POST", "/v1/jobs/%s/cancel" % job)

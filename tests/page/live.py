@@ -61,7 +61,7 @@ def killed(browser):
     port = free_port()
     with Server(port=port) as server, browser.at(server) as tabs:
         tabs.context.add_init_script(NOTES)
-        job = server.submit(talkative(250, refine=3), name="watched")
+        job = server.submit(talkative(250, refine=4), name="watched")
         page = tabs.page("#/jobs/" + job, "Convergence, live")
         page.locator("#residuals canvas").wait_for()
         until("a hundred events", lambda: page.evaluate("ids.length") > 100)

@@ -238,7 +238,7 @@ def queue(tabs, server, ids):
     page.get_by_role("button", name="Resume").click()
     page.get_by_text("Nothing waits.").wait_for()
     server.finished(job)
-    slow = submit(server, talkative(1000, refine=2), name="runs here")
+    slow = submit(server, talkative(2000, refine=5), name="runs here")
     page.get_by_role("link", name="runs here").wait_for()
     page.get_by_role("link", name="runs here").click()
     page.once("dialog", lambda dialog: dialog.accept())
