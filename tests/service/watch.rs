@@ -60,7 +60,7 @@ async fn a_stream_continues_after_the_last_received_event() {
     let get = |after: usize| server.get(&format!("/v1/jobs/{id}/events?after_seq={after}"));
     let text = get(n - 1).send().await.unwrap().text().await.unwrap();
     // how long a browser waits before it asks again
-    let first = format!("retry: 1000\n\nid: {n}\n");
+    let first = format!("retry: 1000\nid: {n}\n");
     assert!(text.starts_with(&first), "{text}");
     let text = get(0)
         .header("Last-Event-ID", (n - 1).to_string())

@@ -60,21 +60,41 @@ impl Store {
     }
 }
 
-/// The iterations of one attempt of a job, each as the number and the JSON of its event, in order.
+/// The iterations of one attempt of a job, each as the number and the JSON of its event, in order; if there are more than
+/// `most`, that many of them, evenly distributed. The others are not read.
 pub(super) fn iterations(
     connection: &Connection,
     key: i64,
     attempt: i32,
+    most: Option<usize>,
 ) -> Result<Vec<(i64, String)>> {
-    connection.rows(
+    let count: i64 = connection.value(
+        "select count(*) from event where job_id = ? and attempt = ? and type = 'iteration'",
+        (key, attempt),
+    )?;
+    let mut kept = spread(usize::try_from(count).unwrap_or(0), most).peekable();
+    let mut place = 0..;
+    let rows = connection.rows(
         "select seq, attempt, t, type, body, checksum from event
          where job_id = ? and attempt = ? and type = 'iteration' order by seq",
         (key, attempt),
         |row| {
+            if kept.next_if_eq(&place.next().unwrap_or(0)).is_none() {
+                return Ok(None);
+            }
             let (seq, body) = checked(key, row)?;
-            Ok((seq, body.to_owned()))
+            Ok(Some((seq, body.to_owned())))
         },
-    )
+    )?;
+    Ok(rows.into_iter().flatten().collect())
+}
+
+/// The places of at most `most` of `count` things (`most` is 2 or more), evenly distributed, including the first and the
+/// last; all for `None`.
+pub fn spread(count: usize, most: Option<usize>) -> impl Iterator<Item = usize> {
+    let kept = most.map_or(count, |most| count.min(most.max(2)));
+    let steps = kept.saturating_sub(1).max(1);
+    (0..kept).map(move |n| (n * count.saturating_sub(1) + steps / 2) / steps)
 }
 
 /// At most `limit` events after number `after`, in order; an error if an event is damaged or missing.
@@ -176,4 +196,23 @@ pub(super) fn insert(
         )?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_of_many_has_their_ends_and_at_most_the_requested_number() {
+        for count in 0..40 {
+            for most in 2..45 {
+                let kept: Vec<usize> = spread(count, Some(most)).collect();
+                assert_eq!(kept.len(), most.min(count), "{count} {most}");
+                let ends = (kept.first().copied(), kept.last().copied());
+                assert_eq!(ends, ((0..count).next(), (0..count).last()));
+                assert!(kept.is_sorted_by(|a, b| a < b), "{kept:?}");
+            }
+            assert!(spread(count, None).eq(0..count));
+        }
+    }
 }

@@ -180,7 +180,7 @@ pub use self::{
     end::CancelOutcome,
     entries::Entries,
     error::{Damage, Record, Result, StoreError},
-    events::FinalBatch,
+    events::{FinalBatch, spread},
     filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy},
     health::Health,
     inspect::{Report, inspect},

@@ -168,10 +168,11 @@ impl Snapshot {
         Ok(names.await?.unwrap_or_default())
     }
 
-    /// The iterations of the job's current attempt, each as the number and the JSON of its event, in order.
-    pub async fn iterations(&mut self) -> Result<Vec<(i64, String)>> {
+    /// The iterations of the job's current attempt, each as the number and the JSON of its event, in order; at most
+    /// `most` of them, evenly distributed.
+    pub async fn iterations(&mut self, most: Option<usize>) -> Result<Vec<(i64, String)>> {
         let (key, attempt) = (self.job.key, self.job.attempt);
-        self.read(move |stored| events::iterations(stored.moment.connection()?, key, attempt))
+        self.read(move |stored| events::iterations(stored.moment.connection()?, key, attempt, most))
             .await
     }
 

@@ -70,6 +70,8 @@ async function start() {
   setInterval(() => state.me && !state.needsToken && !document.hidden && request("v1/me", { cache: "no-store" }).catch(() => undefined), LOOK);
   document.addEventListener("keydown", shortcut);
   draw();
+  // the modules of the first view come while the caller is asked for; `show` tells if they do not come
+  VIEWS[viewOf(route())]?.().catch(() => undefined);
   try {
     state.me = await getSurely("v1/me", new AbortController().signal);
   } catch (error) {

@@ -1,6 +1,6 @@
 /**
  * A body in the plane with what is around it: elements coloured by a field, deformed by its displacements, with boundaries,
- * supports and obstacles. Elements are drawn by WebGL2, and without it, more slowly, on a plain canvas.
+ * supports and obstacles. The elements are drawn by a worker (painter.js), all else here on a canvas above.
  */
 
 import { number } from "./format.js";
@@ -25,27 +25,8 @@ const SIGNED = [
   [0.65, 0.12, 0.12],
 ];
 
-const VERTEX = `#version 300 es
-in vec2 position; in vec2 moved; in float value;
-uniform float scale; uniform vec2 center; uniform vec2 zoom;
-out float v;
-void main() { gl_Position = vec4((position + scale * moved - center) * zoom, 0.0, 1.0); v = value; }`;
-const FRAGMENT = `#version 300 es
-precision highp float;
-in float v; uniform vec2 range; uniform vec4 plain; uniform bool coloured; uniform vec3 ramp[6]; uniform int stops;
-out vec4 color;
-void main() {
-  color = plain;
-  if (!coloured || !(v >= -1e37 && v <= 1e37)) return;
-  float t = clamp((v - range.x) / max(range.y - range.x, 1e-30), 0.0, 1.0) * float(stops - 1);
-  int n = min(int(t), stops - 2);
-  color = vec4(mix(ramp[n], ramp[n + 1], t - float(n)), 1.0);
-}`;
-
 /** The number of elements up to which their sides are drawn at first. */
 const FEW = 6000;
-/** The number of elements that are drawn without WebGL. */
-const MOST_PLAIN = 30_000;
 
 const css = (/** @type {string} */ name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
@@ -94,8 +75,8 @@ export class Drawing {
     this.canvas = document.createElement("canvas");
     this.over = document.createElement("canvas");
     root.replaceChildren(this.canvas, this.over);
-    const gl = this.canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
-    this.painter = gl ? new WebGlPainter(gl) : new PlainPainter(this.canvas);
+    this.painter = new Worker(new URL("./painter.js", import.meta.url), { type: "module" });
+    this.painter.addEventListener("error", () => options.read?.("The body cannot be drawn. Load the page again."));
     this.listen();
   }
 
@@ -116,7 +97,7 @@ export class Drawing {
   close() {
     this.stop?.abort();
     this.resized?.disconnect();
-    this.painter.close();
+    this.painter.terminate();
   }
 
   /**
@@ -125,17 +106,38 @@ export class Drawing {
    */
   setBody(view) {
     this.view = view;
-    this.edges = view.head.elements <= FEW;
+    const few = view.head.elements <= FEW;
+    this.edges = few;
     this.moved = null;
     this.values = null;
-    this.painter.setBody(view);
+    // whether lines are smooth is a property of the canvas; those of many elements are not, and take half the time
+    const canvas = document.createElement("canvas");
+    this.canvas.replaceWith(canvas);
+    this.canvas = canvas;
+    const { positions, quads, triangles, outline } = view.arrays;
+    const offscreen = canvas.transferControlToOffscreen();
+    this.paint({ canvas: offscreen, body: { positions, quads, triangles, outline }, smooth: few }, [offscreen]);
     this.showAll();
+  }
+
+  /**
+   * Tells the worker something.
+   * @param {import("./painter.js").Message} message
+   * @param {Transferable[]} [given]
+   */
+  paint(message, given = []) {
+    this.painter.postMessage(message, given);
+  }
+
+  /** The colours of the field. */
+  ramp() {
+    return this.signed ? SIGNED : RAMP;
   }
 
   /** @param {Float32Array | null} moved the displacement of each corner */
   setMoved(moved) {
     this.moved = moved;
-    this.painter.setMoved(moved);
+    this.paint({ moved });
     this.draw();
   }
 
@@ -152,7 +154,7 @@ export class Drawing {
       const most = Math.max(-range[0], range[1]);
       this.range = [-most, most];
     }
-    this.painter.setValues(values);
+    this.paint({ values });
     this.draw();
   }
 
@@ -339,11 +341,11 @@ export class Drawing {
     const ratio = devicePixelRatio || 1;
     const { clientWidth: width, clientHeight: height } = this.root;
     if (!width || !height || !this.view) return;
-    for (const canvas of [this.canvas, this.over]) {
-      const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
-      if (canvas.width !== wide || canvas.height !== high) Object.assign(canvas, { width: wide, height: high });
-    }
-    this.painter.paint(this);
+    const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (this.over.width !== wide || this.over.height !== high) Object.assign(this.over, { width: wide, height: high });
+    const { center, zoom, scale, range, edges } = this;
+    const colors = { panel: rgb("--panel"), body: rgb("--body"), edge: rgb("--edge"), text: rgb("--text") };
+    this.paint({ scene: { width, height, ratio, center, zoom, scale, range, ramp: this.ramp(), edges, colors } });
     this.drawOver();
   }
 
@@ -447,7 +449,7 @@ export class Drawing {
     const width = this.root.clientWidth;
     const height = Math.min(180, this.root.clientHeight - 40);
     const [left, top] = [width - 26, 16];
-    const ramp = this.signed ? SIGNED : RAMP;
+    const ramp = this.ramp();
     const gradient = context.createLinearGradient(0, top + height, 0, top);
     ramp.forEach((color, n) => gradient.addColorStop(n / (ramp.length - 1), `rgb(${color.map((part) => Math.round(255 * part)).join(" ")})`));
     context.fillStyle = gradient;
@@ -508,209 +510,4 @@ export function bounds(/** @type {ArrayLike<number>} */ points) {
     }
   }
   return box;
-}
-
-/** The triangles of a view: those of quadrilaterals in two. */
-function trianglesOf(/** @type {View} */ { arrays }) {
-  const [quads, own] = [arrays.quads ?? [], arrays.triangles ?? []];
-  const all = new Uint32Array((quads.length / 4) * 6 + own.length);
-  let at = 0;
-  for (let n = 0; n < quads.length; n += 4) {
-    for (const corner of [0, 1, 2, 0, 2, 3]) all[at++] = quads[n + corner] ?? 0;
-  }
-  for (let n = 0; n < own.length; n += 1) all[at++] = own[n] ?? 0;
-  return all;
-}
-
-/** The sides of the elements of a view, as pairs of corners; inner ones twice. */
-function sidesOf(/** @type {View} */ { arrays }) {
-  /** @type {number[]} */
-  const all = [];
-  for (const [ids, corners] of /** @type {[Uint32Array, number][]} */ ([[arrays.quads ?? [], 4], [arrays.triangles ?? [], 3]])) {
-    for (let n = 0; n < ids.length; n += corners) {
-      for (let k = 0; k < corners; k += 1) {
-        const [a = 0, b = 0] = [ids[n + k], ids[n + ((k + 1) % corners)]];
-        if (a < b) all.push(a, b);
-      }
-    }
-  }
-  return new Uint32Array(all);
-}
-
-/** Draws by WebGL2. */
-class WebGlPainter {
-  /** @param {WebGL2RenderingContext} gl */
-  constructor(gl) {
-    this.gl = gl;
-    const program = /** @type {WebGLProgram} */ (gl.createProgram());
-    for (const [kind, source] of /** @type {[number, string][]} */ ([[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]])) {
-      const shader = /** @type {WebGLShader} */ (gl.createShader(kind));
-      gl.shaderSource(shader, source);
-      gl.compileShader(shader);
-      gl.attachShader(program, shader);
-    }
-    gl.linkProgram(program);
-    gl.useProgram(program);
-    this.program = program;
-    this.buffers = Object.fromEntries(["position", "moved", "value", "triangles", "sides", "outline"].map((name) => [name, gl.createBuffer()]));
-    this.counts = { triangles: 0, sides: -1, outline: 0 };
-  }
-
-  close() {
-    this.gl.getExtension("WEBGL_lose_context")?.loseContext();
-  }
-
-  /**
-   * @param {string} name of an attribute
-   * @param {Float32Array | null} values
-   * @param {number} size
-   */
-  attribute(name, values, size) {
-    const { gl } = this;
-    const place = gl.getAttribLocation(this.program, name);
-    if (!values) {
-      gl.disableVertexAttribArray(place);
-      gl.vertexAttrib2f(place, 0, 0);
-      return;
-    }
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[name] ?? null);
-    gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
-    gl.enableVertexAttribArray(place);
-    gl.vertexAttribPointer(place, size, gl.FLOAT, false, 0, 0);
-  }
-
-  /**
-   * @param {"triangles" | "sides" | "outline"} name
-   * @param {Uint32Array} ids
-   */
-  elements(name, ids) {
-    const { gl } = this;
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers[name] ?? null);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, ids, gl.STATIC_DRAW);
-    this.counts[name] = ids.length;
-  }
-
-  /** @param {View} view */
-  setBody(view) {
-    this.view = view;
-    this.attribute("position", /** @type {Float32Array} */ (view.arrays.positions), 2);
-    this.attribute("moved", null, 2);
-    this.attribute("value", null, 1);
-    this.elements("triangles", trianglesOf(view));
-    this.elements("outline", /** @type {Uint32Array} */ (view.arrays.outline));
-    this.counts.sides = -1;
-  }
-
-  /** @param {Float32Array | null} moved */
-  setMoved(moved) {
-    this.attribute("moved", moved, 2);
-  }
-
-  /** @param {Float32Array | null} values */
-  setValues(values) {
-    this.attribute("value", values, 1);
-  }
-
-  /** @param {Drawing} drawing */
-  paint(drawing) {
-    const { gl, program } = this;
-    const uniform = (/** @type {string} */ name) => gl.getUniformLocation(program, name);
-    const { clientWidth: width, clientHeight: height } = drawing.root;
-    gl.viewport(0, 0, drawing.canvas.width, drawing.canvas.height);
-    const [r = 1, g = 1, b = 1] = rgb("--panel");
-    gl.clearColor(r, g, b, 1);
-    gl.clear(gl.COLOR_BUFFER_BIT);
-    gl.uniform1f(uniform("scale"), drawing.moved ? drawing.scale : 0);
-    gl.uniform2f(uniform("center"), drawing.center[0] ?? 0, drawing.center[1] ?? 0);
-    gl.uniform2f(uniform("zoom"), (2 * drawing.zoom) / width, (2 * drawing.zoom) / height);
-    gl.uniform2f(uniform("range"), drawing.range[0], drawing.range[1]);
-    const ramp = drawing.signed ? SIGNED : RAMP;
-    gl.uniform3fv(uniform("ramp"), ramp.flat());
-    gl.uniform1i(uniform("stops"), ramp.length);
-    const layer = (/** @type {"triangles" | "sides" | "outline"} */ name, /** @type {number} */ mode, /** @type {number[]} */ color, /** @type {boolean} */ coloured) => {
-      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers[name] ?? null);
-      gl.uniform4f(uniform("plain"), color[0] ?? 0, color[1] ?? 0, color[2] ?? 0, color[3] ?? 1);
-      gl.uniform1i(uniform("coloured"), coloured ? 1 : 0);
-      gl.drawElements(mode, this.counts[name], gl.UNSIGNED_INT, 0);
-    };
-    layer("triangles", gl.TRIANGLES, rgb("--body"), drawing.values !== null);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-    if (drawing.edges && this.view) {
-      if (this.counts.sides < 0) this.elements("sides", sidesOf(this.view));
-      layer("sides", gl.LINES, [...rgb("--edge"), drawing.values ? 0.35 : 0.75], false);
-    }
-    layer("outline", gl.LINES, [...rgb("--text"), 0.9], false);
-    gl.disable(gl.BLEND);
-  }
-}
-
-/** Draws on a plain canvas, where there is no WebGL2. */
-class PlainPainter {
-  /** @type {Float32Array | null} */
-  values = null;
-
-  /** @param {HTMLCanvasElement} canvas */
-  constructor(canvas) {
-    this.context = canvas.getContext("2d");
-  }
-
-  close() {}
-
-  /** @param {View} view */
-  setBody(view) {
-    this.triangles = trianglesOf(view);
-    this.view = view;
-  }
-
-  setMoved() {}
-
-  /** @param {Float32Array | null} values */
-  setValues(values) {
-    this.values = values;
-  }
-
-  /** @param {Drawing} drawing */
-  paint(drawing) {
-    const { context, triangles, view } = this;
-    if (!context || !triangles || !view) return;
-    const ratio = devicePixelRatio || 1;
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, drawing.canvas.width, drawing.canvas.height);
-    const ramp = drawing.signed ? SIGNED : RAMP;
-    const count = Math.min(triangles.length, 6 * MOST_PLAIN);
-    const corner = (/** @type {number} */ n) => {
-      const [x = 0, y = 0] = drawing.place(triangles[n] ?? 0);
-      return drawing.toScreen(x, y);
-    };
-    for (let n = 0; n < count; n += 3) {
-      const values = this.values;
-      context.fillStyle = css("--body");
-      if (values) {
-        const mean = ((values[triangles[n] ?? 0] ?? 0) + (values[triangles[n + 1] ?? 0] ?? 0) + (values[triangles[n + 2] ?? 0] ?? 0)) / 3;
-        const t = Math.max(0, Math.min(1, (mean - drawing.range[0]) / (drawing.range[1] - drawing.range[0] || 1))) * (ramp.length - 1);
-        const [low, high] = [ramp[Math.floor(t)] ?? [], ramp[Math.min(ramp.length - 1, Math.floor(t) + 1)] ?? []];
-        const color = low.map((part, k) => Math.round(255 * (part + (t % 1) * ((high[k] ?? 0) - part))));
-        context.fillStyle = `rgb(${color.join(" ")})`;
-      }
-      context.beginPath();
-      for (const k of [0, 1, 2]) {
-        const [x = 0, y = 0] = corner(n + k);
-        context.lineTo(x, y);
-      }
-      context.fill();
-    }
-    context.strokeStyle = css("--text");
-    context.beginPath();
-    const outline = view.arrays.outline ?? [];
-    for (let n = 0; n + 1 < outline.length; n += 2) {
-      for (const k of [0, 1]) {
-        const [px = 0, py = 0] = drawing.place(outline[n + k] ?? 0);
-        const [x = 0, y = 0] = drawing.toScreen(px, py);
-        if (k) context.lineTo(x, y);
-        else context.moveTo(x, y);
-      }
-    }
-    context.stroke();
-  }
 }

@@ -9,7 +9,7 @@ use base::{
     values::Integers,
 };
 use futures_util::future::BoxFuture;
-use store::Snapshot;
+use store::{Snapshot, spread};
 
 use super::{
     jobs,
@@ -50,11 +50,12 @@ async fn read_history(
     partial: bool,
 ) -> Result<Found<Vec<HistoryRow>>, ApiError> {
     let share = room_for(service, caller, id, &["history"]).await?;
+    let most = max_points.map(|most| usize::try_from(most).unwrap_or(usize::MAX));
     let load = async {
         let mut found = jobs::snapshot(service, caller, id).await?;
         is_wanted(&found.job, partial)?;
         let available = found.job.result_available;
-        let content = StoredHistory::load(&mut found).await?;
+        let content = StoredHistory::load(&mut found, most).await?;
         Ok(Found {
             available,
             content,
@@ -74,41 +75,45 @@ async fn read_history(
             share,
         })
     };
-    let mut rows = service.work_on(load, read).await??;
-    if let Some(most) = max_points {
-        downsample(
-            &mut rows.content,
-            usize::try_from(most).unwrap_or(usize::MAX),
-        );
-    }
-    Ok(rows)
+    service.work_on(load, read).await?
 }
 
 /// The rows of a history in their stored form.
 pub(super) enum StoredHistory {
-    /// A history that is stored with the result.
-    Whole(Vec<u8>),
+    /// A history that is stored with the result, and how many of its rows are wanted.
+    Whole(Vec<u8>, Option<usize>),
     /// Rows that are stored one by one, as events, each with its number.
     Events(Vec<(i64, String)>),
 }
 
 impl StoredHistory {
-    pub(super) async fn load(found: &mut Snapshot) -> Result<StoredHistory, ApiError> {
+    /// At most `most` rows, evenly distributed, including the first and the last.
+    pub(super) async fn load(
+        found: &mut Snapshot,
+        most: Option<usize>,
+    ) -> Result<StoredHistory, ApiError> {
         let job = &found.job;
         // a partial result ends with the last finished load step; the events go on
         if job.status.is_terminal() && job.result_available == ResultAvailable::Final {
             let whole = found.part("history").await?;
             if let Some(whole) = whole {
-                return Ok(StoredHistory::Whole(whole));
+                return Ok(StoredHistory::Whole(whole, most));
             }
         }
-        Ok(StoredHistory::Events(found.iterations().await?))
+        Ok(StoredHistory::Events(found.iterations(most).await?))
     }
 
     pub(super) fn read(self) -> Result<Vec<HistoryRow>, ApiError> {
         let rows = match self {
-            StoredHistory::Whole(bytes) => serde_json::from_slice(&bytes)
-                .map(|rows: Vec<TimedIteration>| rows.into_iter().map(Into::into).collect()),
+            StoredHistory::Whole(bytes, most) => {
+                serde_json::from_slice(&bytes).map(|rows: Vec<TimedIteration>| {
+                    let mut kept = spread(rows.len(), most).peekable();
+                    let rows = rows.into_iter().enumerate();
+                    rows.filter(|(place, _)| kept.next_if_eq(place).is_some())
+                        .map(|(_, row)| row.into())
+                        .collect()
+                })
+            }
             StoredHistory::Events(lines) => {
                 let numbered = |(seq, line): &(i64, String)| {
                     let timed = row(line)?;
@@ -132,42 +137,10 @@ fn row(line: &str) -> serde_json::Result<TimedIteration> {
     }
 }
 
-/// Keeps at most `most` rows (`most` is 2 or more), evenly distributed, including the first and the last.
-fn downsample<T>(rows: &mut Vec<T>, most: usize) {
-    let count = rows.len();
-    if count <= most || most < 2 {
-        return;
-    }
-    // the n-th row that is kept; strictly increasing, since most ≤ count
-    let kept = |n: usize| (n * (count - 1) + (most - 1) / 2) / (most - 1);
-    let (mut place, mut next) = (0, 0);
-    rows.retain(|_| {
-        let keep = place == kept(next);
-        place += 1;
-        next += usize::from(keep);
-        keep
-    });
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-
-    #[test]
-    fn a_reduced_history_has_its_ends_and_at_most_the_requested_number_of_rows() {
-        for count in 0..40 {
-            for most in 2..45 {
-                let all: Vec<u32> = (1..=count).collect();
-                let mut rows: Vec<_> = all.iter().map(|k| fake::timed(*k)).collect();
-                downsample(&mut rows, most);
-                let kept: Vec<u32> = rows.iter().map(|timed| timed.row.k).collect();
-                assert_eq!(kept.len(), most.min(all.len()), "{count} {most}");
-                assert_eq!((kept.first(), kept.last()), (all.first(), all.last()));
-                assert!(kept.is_sorted());
-            }
-        }
-    }
 
     #[test]
     fn the_event_of_an_iteration_contains_its_row() {

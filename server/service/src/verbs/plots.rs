@@ -227,7 +227,7 @@ pub fn plot<'a>(
                 _ => found.part("summary").await?,
             };
             let history = match plot {
-                Plot::Convergence => Some(StoredHistory::load(&mut found).await?),
+                Plot::Convergence => Some(StoredHistory::load(&mut found, None).await?),
                 _ => None,
             };
             let job = found.job.clone();

@@ -55,6 +55,8 @@ class JobView {
   refining;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   soon;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  next;
   /** @type {ReturnType<typeof setInterval> | undefined} */
   poll;
   /** @type {(() => void) | undefined} */
@@ -97,6 +99,7 @@ class JobView {
     clearInterval(this.clock);
     clearInterval(this.poll);
     clearTimeout(this.soon);
+    clearTimeout(this.next);
     for (const part of [this.residuals, this.forces, this.refining, this.profiles, this.body]) part?.close();
   }
 
@@ -115,6 +118,7 @@ class JobView {
 
   async load() {
     const { signal } = this.closed;
+    const history = this.loadHistory();
     try {
       this.job = await getSurely(this.path(""), signal);
     } catch (error) {
@@ -130,10 +134,11 @@ class JobView {
       const earlier = request(`v1/jobs/${this.job.cached_from}`, { signal });
       earlier.then(() => (this.earlier = true), () => undefined).then(() => this.drawSoon());
     }
+    const attempt = this.job?.attempt ?? 1;
     if (this.ended()) {
-      await Promise.all([this.loadHistory("&max_points=2000"), this.loadResult()]);
+      await Promise.all([history.then((rows) => this.take(rows, attempt)), this.loadResult()]);
     } else {
-      await this.loadHistory(`&max_points=${FIRST_ROWS}`);
+      this.take(await history, attempt);
       const last = this.rows[this.rows.length - 1];
       // it has ended meanwhile: all its events come, and rows without a number would come twice
       if (last && (last.seq === null || last.seq === undefined)) this.rows = [];
@@ -155,14 +160,18 @@ class JobView {
     this.drawSoon();
   }
 
-  /** @param {string} most */
-  async loadHistory(most) {
-    const path = this.path(`/history?format=json&partial=true${most}`);
-    /** @type {import("../types").HistoryRow[]} */
-    const rows = await getSurely(path, this.closed.signal).catch(() => []);
-    const attempt = this.job?.attempt ?? 1;
+  /** @returns {Promise<import("../types").HistoryRow[]>} */
+  loadHistory() {
+    return getSurely(this.path(`/history?format=json&partial=true&max_points=${FIRST_ROWS}`), this.closed.signal).catch(() => []);
+  }
+
+  /**
+   * @param {import("../types").HistoryRow[]} rows
+   * @param {number} attempt whose rows they are
+   */
+  take(rows, attempt) {
     this.rows = rows.map((row) => ({ ...row, attempt }));
-    this.drawSoon();
+    this.draw();
   }
 
   async loadResult() {
@@ -441,7 +450,12 @@ class JobView {
     const find = (/** @type {string} */ id) => /** @type {HTMLElement} */ (this.root.querySelector(`#${id}`));
     this.profiles ??= new ProfilePanel(find("profile"), this.app, this.query);
     this.body ??= new BodyPanel(find("body"));
-    if (this.rows.length > 1) this.drawConvergence(find("residuals"), find("forces"), find("residual-readout"));
+    if (this.rows.length > 1) {
+      this.drawResiduals(find("residuals"), find("residual-readout"));
+      // in a task of its own: while one lasts, the page does not answer
+      clearTimeout(this.next);
+      this.next = setTimeout(() => this.drawForces(find("forces")));
+    }
     const meshes = this.refinements();
     if (meshes.length > 1) {
       this.refining ??= new Chart(find("refining"), { label: "The error by the number of elements", x: "elements", y: "relative error", log: true, whole: true, height: 170 });
@@ -450,15 +464,20 @@ class JobView {
   }
 
   /**
+   * The rows of an attempt that are drawn.
+   * @param {number | undefined} attempt
+   */
+  rowsOf(attempt) {
+    return thinned(this.rows.filter((row) => row.attempt === attempt), (row) => Math.log(Math.max(row.friction_residual, 1e-300)));
+  }
+
+  /**
    * @param {HTMLElement} residuals
-   * @param {HTMLElement} forces
    * @param {HTMLElement} readout
    */
-  drawConvergence(residuals, forces, readout) {
+  drawResiduals(residuals, readout) {
     const attempts = [...new Set(this.rows.map((row) => row.attempt))];
-    const newest = attempts[attempts.length - 1];
-    const of = (/** @type {number | undefined} */ attempt) => thinned(this.rows.filter((row) => row.attempt === attempt), (row) => Math.log(Math.max(row.friction_residual, 1e-300)));
-    const now = of(newest);
+    const now = this.rowsOf(attempts[attempts.length - 1]);
     const x = now.map((row) => row.k);
     const few = now.length < 60;
     const hasFriction = now.some((row) => row.friction_residual > 0);
@@ -476,7 +495,7 @@ class JobView {
       },
     });
     const old = attempts.slice(0, -1).slice(-5).map((attempt) => {
-      const rows = of(attempt);
+      const rows = this.rowsOf(attempt);
       return { label: `attempt ${attempt}`, color: "--curve-old", width: 1, x: rows.map((row) => row.k), y: rows.map((row) => Math.max(row.residual, row.friction_residual)) };
     });
     this.residuals.set([
@@ -485,6 +504,12 @@ class JobView {
       { label: "contact residual", color: "--curve-2", points: few, x, y: now.map((row) => row.residual) },
       ...(hasFriction ? [{ label: "friction residual", color: "--curve-1", points: few, x, y: now.map((row) => row.friction_residual) }] : []),
     ]);
+  }
+
+  /** @param {HTMLElement} forces */
+  drawForces(forces) {
+    const now = this.rowsOf(this.rows[this.rows.length - 1]?.attempt);
+    const x = now.map((row) => row.k);
     this.forces ??= new Chart(forces, { label: "Forces by iteration", x: "iteration", y: "force", whole: true, height: 170, sync: "convergence" });
     this.forces.set([
       { label: "normal force", color: "--curve-1", x, y: now.map((row) => row.force.normal) },

@@ -237,9 +237,11 @@ fn pieces<E: Numbered>(
 ) -> impl Stream<Item = String> + Send {
     stream! {
         let mut events = pin!(events.ready_chunks(AT_ONCE));
-        if let Encoding::Stream = encoding {
-            yield format!("retry: {RETRY_MS}\n\n");
-        }
+        // it stands in the block of the first event: simple clients take each block for an event
+        let mut retry = match encoding {
+            Encoding::Stream => Some(format!("retry: {RETRY_MS}\n")),
+            Encoding::Lines => None,
+        };
         loop {
             let next = match encoding {
                 Encoding::Stream => timeout(PING, events.next()).await,
@@ -250,7 +252,7 @@ fn pieces<E: Numbered>(
                 continue;
             };
             let Some(chunk) = next else { return };
-            let mut piece = String::new();
+            let mut piece = retry.take().unwrap_or_default();
             let added = chunk.into_iter().try_for_each(|event| add(&event?, encoding, &mut piece));
             if !piece.is_empty() {
                 yield piece;

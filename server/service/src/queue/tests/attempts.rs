@@ -543,6 +543,6 @@ async fn a_full_disk_delays_a_job_and_does_not_end_it() {
         (Status::Failed, Some(Reason::TimedOut))
     );
     let found = rig.store.snapshot(Owners::All, job.id).await;
-    let stored = found.unwrap().unwrap().iterations().await.unwrap();
+    let stored = found.unwrap().unwrap().iterations(None).await.unwrap();
     assert_eq!(stored.len(), done.progress.unwrap().iteration as usize);
 }
