@@ -46,7 +46,7 @@ fn swagger_ui(out: &Path) -> Result<(), Box<dyn Error>> {
 }
 
 /// The name of the page in its folder; in its text `DIGEST` stands for the digest of all files, and `PRELOADS` for the links
-/// to the modules that it begins with.
+/// to the modules that it begins with and those of a job.
 const PAGE: &str = "index.html";
 
 /// Writes the list of the page's files, each with its content as it is and compressed.
@@ -82,6 +82,8 @@ fn page(folder: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
     }
     let mut modules = BTreeSet::new();
     imports(folder, "app.js", &mut modules)?;
+    // a job is what an address is shared of, and what is opened next from the list
+    imports(folder, "views/job.js", &mut modules)?;
     let preloads: String = modules.iter().fold(String::new(), |mut links, path| {
         let _ = writeln!(
             links,

@@ -51,8 +51,9 @@ def opened(browser, server, address, wanted):
             tabs.context.add_init_script(NOTES.replace("WANTED", "{%s}" % ", ".join("%s: () => %s" % (json.dumps(name), test() if callable(test) else test) for name, test in wanted.items())))
             page = tabs.context.new_page()
             page.goto(server.url + "/" + address, wait_until="commit")
+            # each question is work for the page that is measured
+            page.wait_for_timeout(2500)
             until("%s at %s" % (", ".join(wanted), address), lambda: page.evaluate("Object.keys(window.seen ?? {}).length") == len(wanted), 60)
-            page.wait_for_timeout(500)
             seen = page.evaluate("seen")
             for name in wanted:
                 found[name].append(seen[name])

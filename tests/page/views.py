@@ -136,6 +136,55 @@ def finished_job(tabs, server, ids):
     page.close()
 
 
+#: Which part of the drawing of a body is coloured by a field; the body without one is nearly grey.
+COLOURED = """
+(() => {
+  const drawn = document.querySelector("#drawing canvas");
+  const { width, height } = drawn;
+  if (!width || !height) return null;
+  const context = new OffscreenCanvas(width, height).getContext("2d");
+  context.drawImage(drawn, 0, 0);
+  const { data } = context.getImageData(0, 0, width, height);
+  let coloured = 0;
+  for (let n = 0; n < data.length; n += 4) coloured += data[n + 3] > 0 && Math.max(data[n], data[n + 1], data[n + 2]) - Math.min(data[n], data[n + 1], data[n + 2]) > 60;
+  return coloured / (width * height);
+})()
+"""
+#: The start of a worker in a browser without WebGL2.
+WITHOUT_WEBGL = """
+const { getContext } = OffscreenCanvas.prototype;
+OffscreenCanvas.prototype.getContext = function (kind, ...more) { return kind === "webgl2" ? null : getContext.call(this, kind, ...more); };
+"""
+
+
+def drawn_body(tabs, server, ids):
+    def opened():
+        page = tabs.page("#/jobs/" + ids["rectangular_punch"], "Good, but for one number")
+        page.get_by_role("button", name="von Mises").wait_for()
+        return page
+
+    page = opened()
+    until("the colours of a field", lambda: (page.evaluate(COLOURED) or 0) > 0.1)
+    page.get_by_role("button", name="as asked").click()
+    until("a body without a field", lambda: page.evaluate(COLOURED) == 0)
+    page.close()
+
+    def plain(route):
+        answer = route.fetch()
+        route.fulfill(response=answer, body=WITHOUT_WEBGL + answer.text())
+    tabs.context.route("**/painter.js", plain)
+    page = opened()
+    until("the colours of a field without WebGL2", lambda: (page.evaluate(COLOURED) or 0) > 0.1)
+    page.close()
+    tabs.context.unroute("**/painter.js")
+
+    tabs.context.route("**/painter.js", lambda route: route.fulfill(status=404))
+    page = opened()
+    page.get_by_text("The body cannot be drawn. Load the page again.").wait_for()
+    page.close()
+    tabs.context.unroute("**/painter.js")
+
+
 def new_job(tabs, server, ids):
     page = tabs.page("#/new", "An elastic body")
     page.locator("#picture canvas").first.wait_for()
@@ -253,5 +302,5 @@ def run(browser):
     with Server() as server:
         ids = filled(server)
         with browser.at(server) as tabs:
-            for view in (list_of_jobs, finished_job, new_job, comparison, sweeps, queue):
+            for view in (list_of_jobs, finished_job, drawn_body, new_job, comparison, sweeps, queue):
                 view(tabs, server, ids)

@@ -120,7 +120,7 @@ class JobView {
     const { signal } = this.closed;
     const history = this.loadHistory();
     try {
-      this.job = await getSurely(this.path(""), signal);
+      this.job = /** @type {Job} */ (await getSurely(this.path(""), signal));
     } catch (error) {
       if (signal.aborted) return;
       this.error = error;
@@ -129,16 +129,12 @@ class JobView {
     }
     this.app.title(this.name());
     this.draw();
-    this.loadDescription();
-    if (this.job?.cached_from) {
-      const earlier = request(`v1/jobs/${this.job.cached_from}`, { signal });
-      earlier.then(() => (this.earlier = true), () => undefined).then(() => this.drawSoon());
-    }
     const attempt = this.job?.attempt ?? 1;
     if (this.ended()) {
       await Promise.all([history.then((rows) => this.take(rows, attempt)), this.loadResult()]);
     } else {
       this.take(await history, attempt);
+      if (signal.aborted) return;
       const last = this.rows[this.rows.length - 1];
       // it has ended meanwhile: all its events come, and rows without a number would come twice
       if (last && (last.seq === null || last.seq === undefined)) this.rows = [];
@@ -146,7 +142,13 @@ class JobView {
       if (this.job?.result_available === "partial") this.loadResult();
       this.poll = setInterval(() => this.ask(), POLL);
     }
-    if (!signal.aborted && this.job) this.body?.load(this.job, this.partial());
+    if (signal.aborted) return;
+    this.body?.load(this.job, this.partial());
+    this.loadDescription();
+    if (this.job.cached_from) {
+      const earlier = request(`v1/jobs/${this.job.cached_from}`, { signal });
+      earlier.then(() => (this.earlier = true), () => undefined).then(() => this.drawSoon());
+    }
   }
 
   name() {
