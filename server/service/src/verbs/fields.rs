@@ -1,6 +1,6 @@
 //! Operations that return mesh, displacements and stresses, as JSON in pieces or in another format.
 
-use std::sync::Arc;
+use std::{fmt::Display, sync::Arc};
 
 use async_stream::try_stream;
 use base::{
@@ -150,6 +150,19 @@ pub fn converted_fields<'a>(
     format: Format,
     partial: bool,
 ) -> BoxFuture<'a, Result<Found<Vec<u8>>, ApiError>> {
+    written_fields(service, caller, id, partial, move |loaded| {
+        formats::fields(&loaded.fields, format)
+    })
+}
+
+/// Writes the fields of a job in a form that is made in memory; `partial` as for `fields`.
+pub(super) fn written_fields<'a, E: Display + Send + 'static>(
+    service: &'a Arc<Service>,
+    caller: &'a Caller,
+    id: JobId,
+    partial: bool,
+    write: impl FnOnce(&LoadedFields) -> Result<Vec<u8>, E> + Send + 'static,
+) -> BoxFuture<'a, Result<Found<Vec<u8>>, ApiError>> {
     Box::pin(async move {
         let found = with_result(service, caller, id).await?;
         is_wanted(&found.job, partial)?;
@@ -159,7 +172,7 @@ pub fn converted_fields<'a>(
         // before there is a permit to work: who has that must not wait for memory, which others keep until they have worked
         let loaded = load(service, job.key).await?;
         let loaded = loaded.ok_or_else(|| no_result(&job))?;
-        let written = service.work(move || formats::fields(&loaded.fields, format));
+        let written = service.work(move || write(&loaded));
         let content = written.await?.map_err(ApiError::internal)?;
         Ok(Found::new(job.result_available, content))
     })

@@ -37,14 +37,14 @@ pub const NEXT_PAGE_TOKEN: &str = "next-page-token";
 /// The columns of the table.
 pub const COLUMNS: Parameter<ColumnNames> = Parameter {
     name: "columns",
-    meaning: "Columns of the table, separated by commas and in this order: those of a job, label.KEY for the value of a label, normal_force for a number of the result of a job with one contact, normal_force.BOUNDARY for that of the contact of this name, likewise normal_force_error for its ±, and /contacts/0/friction/coefficient for a value of the problem, by its JSON Pointer; default: id, name, status, reason, verdict, created_at, run_s, contacts, all numbers with their errors, severity (of the most severe warning), warnings, labels. A peak that grows on finer meshes has no number",
+    meaning: "Columns of the table, separated by commas and in this order: those of a job, label.KEY for the value of a label, normal_force for a number of the result of a job with one contact, normal_force.BOUNDARY for that of the contact of this name, likewise normal_force_error for its ±, and /contacts/0/friction/coefficient for a value of the problem, by its JSON Pointer, empty for a problem of more than 256 KiB and beyond 8 MiB of problems in all; default: id, name, status, reason, verdict, created_at, run_s, contacts, all numbers with their errors, severity (of the most severe warning), warnings, labels. A peak that grows on finer meshes has no number",
     values: ColumnNames,
 };
 
 /// Whether the table also has the values in which the problems of its jobs differ.
 pub const DIFFERING: Parameter<Words<bool>> = Parameter {
     name: "differing",
-    meaning: "Whether the table also has the values in which the problems of its rows differ, each as a column named by its JSON Pointer; at most 50; default false",
+    meaning: "Whether the table also has the values in which the problems of its rows differ, each as a column named by its JSON Pointer; at most 50, of problems of at most 256 KiB each and 8 MiB in all; default false",
     values: Words(|| vec![("false", false), ("true", true)]),
 };
 

@@ -22,7 +22,7 @@ use solver::{
 
 use super::{
     fields, jobs, meshes, problems, profiles,
-    results::{self, Found, is_wanted, read, with_result},
+    results::{Found, read, with_result},
     service::Service,
 };
 use crate::{error::ApiError, parameters::Variable};
@@ -119,17 +119,8 @@ pub fn field_of_job<'a>(
     field: ViewField,
     partial: bool,
 ) -> BoxFuture<'a, Result<Found<Vec<u8>>, ApiError>> {
-    Box::pin(async move {
-        let found = with_result(service, caller, id).await?;
-        is_wanted(&found.job, partial)?;
-        let job = found.job.clone();
-        drop(found);
-        fields::are_kept(service, &job).await?;
-        let loaded = fields::load(service, job.key).await?;
-        let loaded = loaded.ok_or_else(|| results::no_result(&job))?;
-        let written = service.work(move || view::field(&loaded.fields, field));
-        let content = written.await?.map_err(ApiError::internal)?;
-        Ok(Found::new(job.result_available, content))
+    fields::written_fields(service, caller, id, partial, move |loaded| {
+        view::field(&loaded.fields, field)
     })
 }
 
