@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
 import urllib.request
 
 import openapi_spec_validator
@@ -33,6 +34,8 @@ SCHEMATHESIS = pathlib.Path(sys.executable).with_name("schemathesis")
 PATIENCE = 240
 # operations that delete or cancel many jobs, or pause the queue
 DRASTIC = "^(DELETE |POST /v1/jobs/cancel|POST /v1/queue/)"
+# a stream without an end, which schemathesis would read for ever; `stream_of_the_list` reads its beginning
+ENDLESS = "^GET /v1/events$"
 # A new seed each time: over many runs that finds more than the same calls every day.
 SETTINGS = """
 hooks = "contract"
@@ -133,12 +136,35 @@ def settings(known, examples):
     )
 
 
+def stream_of_the_list(server):
+    """The stream of a list begins as described, and a wrong request for it is refused."""
+    def begin(query, **headers):
+        request = urllib.request.Request(server.url + "/v1/events" + query, headers=headers)
+        try:
+            with urllib.request.urlopen(request, timeout=60) as answer:
+                return answer.status, answer.headers["Content-Type"], answer.readline()
+        except urllib.error.HTTPError as error:
+            return error.code, error.headers["Content-Type"], error.read()
+
+    described = server.ask("GET", "/openapi.json")["paths"]["/v1/events"]["get"]["responses"]
+    found = [begin(query, **headers) for query in ("", "?status=succeeded", "?label.study=none", "?fields=id,status")
+             for headers in ({}, {"Accept": "application/x-ndjson"}, {"Accept": "application/jsonl"})]
+    found += [begin(query, **headers) for query, headers in (
+        ("?status=done", {}), ("?no_such_filter=1", {}), ("?fields=no_such_field", {}), ("?created_after=yesterday", {}),
+        ("", {"Accept": "image/png"}), ("?after=nonsense", {}))]
+    for status, media, line in found:
+        kinds = described[str(status)]["content"] if str(status) in described else described["default"]["content"]
+        assert media.split(";")[0] in kinds, (status, media, line)
+    assert {status for status, *_ in found} >= {200, 400, 406}, found
+
+
 def run(folder, examples, *which):
     """Schemathesis against a server of its own: the number of calls, and the faults found."""
     folder.mkdir()
     server = Server(folder)
     try:
         openapi_spec_validator.validate(server.ask("GET", "/openapi.json"))
+        stream_of_the_list(server)
         config = folder / "schemathesis.toml"
         config.write_text(settings(server.known, examples), encoding="utf-8")
         command = [SCHEMATHESIS, "--config-file", config, "run", server.url + "/openapi.json", *which]
@@ -157,7 +183,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor() as both:
         folder = pathlib.Path(folder)
         # beside these, drawn at random for each operation, there are those that schemathesis always makes
-        keep = both.submit(run, folder / "keep", least // 40, "--exclude-name-regex", DRASTIC)
+        keep = both.submit(run, folder / "keep", least // 40, "--exclude-name-regex", "%s|%s" % (DRASTIC, ENDLESS))
         drop = both.submit(run, folder / "drop", least // 40, "--include-name-regex", DRASTIC)
         results = [keep.result(), drop.result()]
     calls = sum(calls for calls, _ in results)

@@ -22,7 +22,7 @@ import tempfile
 import time
 
 from attack import MIB, SOAK, check, equal, example
-from outside import BINARY, Server, memory, submission, talkative
+from outside import BINARY, Server, free_port, memory, submission, talkative
 
 TOP = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(TOP / "tests/clients"))

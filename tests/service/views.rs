@@ -191,19 +191,20 @@ async fn a_mesh_and_a_problem_are_drawn_before_they_are_jobs() {
     .await;
     assert!(!drawn.head["obstacles"].as_array().unwrap().is_empty());
     assert!(!drawn.head["supports"].as_array().unwrap().is_empty());
-    let mut wrong = problem;
-    wrong["supports"][0]["boundary"] = json!("nowhere");
-    let (status, problem) = answer(
-        server
-            .post("/v1/problems/view")
-            .json(&json!({"problem": wrong})),
-    )
-    .await;
-    assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
-    assert_eq!(
-        problem["errors"][0]["pointer"],
-        "/problem/supports/0/boundary"
-    );
+    let mut nowhere = problem.clone();
+    nowhere["supports"][0]["boundary"] = json!("nowhere");
+    let mut aimless = problem;
+    aimless["contacts"] = json!([]);
+    aimless["mesh"]["refine"] = json!({"tolerance": 0.05});
+    for (wrong, pointer) in [
+        (nowhere, "/problem/supports/0/boundary"),
+        (aimless, "/problem/mesh/refine"),
+    ] {
+        let request = server.post("/v1/problems/view");
+        let (status, problem) = answer(request.json(&json!({"problem": wrong}))).await;
+        assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{problem:#}");
+        assert_eq!(problem["errors"][0]["pointer"], pointer, "{problem:#}");
+    }
 }
 
 /// Operations: GetJobDescription

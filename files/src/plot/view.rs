@@ -5,10 +5,11 @@
 //! bytes, and the arrays one after another, little-endian numbers of four bytes. The head names the arrays: their types, their
 //! places from the end of the head (bytes), and the numbers that they have.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt};
 
 use serde_json::{Value, json};
 use solver::element::{Element, Family};
+use solver::error::Violation;
 use solver::mesh::Mesh;
 use solver::model::{Level, Model};
 use solver::problem::{Load, Problem};
@@ -103,25 +104,42 @@ impl View {
     }
 }
 
+/// Why a problem has no view.
+#[derive(Debug)]
+pub enum NoView {
+    /// The problem is invalid.
+    Invalid(Vec<Violation>),
+    /// Elements do not fit their nodes, for this reason.
+    Misfit(String),
+}
+
+impl fmt::Display for NoView {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            NoView::Invalid(violations) => match violations.first() {
+                Some(violation) => violation.fmt(f),
+                None => f.write_str("the problem is invalid"),
+            },
+            NoView::Misfit(reason) => f.write_str(reason),
+        }
+    }
+}
+
 /// The body and what surrounds it: corners, elements, outline, boundaries, supports, loads and obstacles. The elements are those of `fields`
 /// where it has some, as adaptive refinement changes them, and the obstacles are then where they ended; otherwise they are
 /// those of the problem.
 ///
 /// # Errors
 ///
-/// The reason in words, if the problem has no mesh that could be drawn.
+/// The violations of a problem without a mesh that could be drawn, or the reason in words why elements do not fit their nodes.
 pub fn geometry(
     problem: &Problem,
     stored: Option<&Mesh>,
     fields: Option<&Fields>,
     profiles: &BTreeMap<String, ContactProfile>,
-) -> Result<Vec<u8>, String> {
+) -> Result<Vec<u8>, NoView> {
     let external = crate::external::external_mesh(problem, stored.cloned());
-    let model = Model::new(problem, external).map_err(|violations| {
-        violations
-            .first()
-            .map_or_else(String::new, ToString::to_string)
-    })?;
+    let model = Model::new(problem, external).map_err(NoView::Invalid)?;
     let mut view = View::new();
     let fields = fields.filter(|fields| !fields.elements.is_empty());
     let refined: Vec<[f64; 2]>;
@@ -133,7 +151,7 @@ pub fn geometry(
         }
         None => (&model.mesh.nodes[..], &model.mesh.elements[..]),
     };
-    add_elements(&mut view, nodes, elements)?;
+    add_elements(&mut view, nodes, elements).map_err(NoView::Misfit)?;
     if fields.is_none() {
         add_groups(&mut view, &model.mesh);
     }

@@ -10,7 +10,10 @@ use base::{
     mesh::MeshInfo,
     values::Words,
 };
-use files::plot::{ViewField, view};
+use files::plot::{
+    ViewField,
+    view::{self, NoView},
+};
 use futures_util::future::BoxFuture;
 use sha2::{Digest, Sha256};
 use solver::{
@@ -25,7 +28,11 @@ use super::{
     results::{Found, read, with_result},
     service::Service,
 };
-use crate::{error::ApiError, parameters::Variable};
+use crate::{
+    error::ApiError,
+    parameters::Variable,
+    violations::{PROBLEM, prefixed},
+};
 
 /// A field of a view in a path.
 pub const FIELD: Variable<Words<ViewField>> = Variable {
@@ -150,8 +157,14 @@ pub fn of_problem<'a>(
         let budget_bytes = service.memory_budget_bytes;
         let draw = move || {
             let stored = problems::first_mesh_within(&problem, stored, budget_bytes)?;
-            view::geometry(&problem, stored.as_ref(), None, &BTreeMap::new())
-                .map_err(|reason| ApiError::NotFound(format!("the problem has no view: {reason}")))
+            view::geometry(&problem, stored.as_ref(), None, &BTreeMap::new()).map_err(|reason| {
+                match reason {
+                    NoView::Invalid(violations) => {
+                        ApiError::InvalidProblem(prefixed(PROBLEM, violations))
+                    }
+                    NoView::Misfit(reason) => ApiError::internal(reason),
+                }
+            })
         };
         service.work(draw).await?
     })
