@@ -6,10 +6,12 @@
 It needs Debian's chromium, and playwright and axe-playwright-python of tests/requirements.txt.
 """
 
+import contextlib
 import sys
 import time
 
 import browser
+import log_in
 import outside
 
 PARTS = ["views", "log_in", "live", "tabs", "hostile", "everybody"]
@@ -21,13 +23,14 @@ def main():
     if unknown:
         sys.exit("unknown parts: %s; there are %s" % (", ".join(sorted(unknown)), ", ".join(PARTS)))
     chromium = browser.Browser()
-    try:
+    with contextlib.ExitStack() as at_the_end:
+        at_the_end.callback(chromium.close)
+        if "log_in" in chosen:
+            at_the_end.enter_context(log_in.expiring(chromium))
         for name in chosen:
             began = time.monotonic()
             __import__(name).run(chromium)
             print("page, %s: %.0f s" % (name, time.monotonic() - began), flush=True)
-    finally:
-        chromium.close()
     print("page: %d checks" % outside.checks)
 
 

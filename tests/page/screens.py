@@ -10,7 +10,7 @@ from PIL import Image
 
 from browser import Browser, settled, until
 from log_in import log_in, token
-from outside import TOP, Server, talkative
+from outside import TOP, Server
 from views import filled, stepped
 
 FOLDER = TOP / "docs/screens"
@@ -39,7 +39,7 @@ def views(browser, scheme):
             take(page, "%s-%s" % (name, scheme))
         job = server.submit(stepped(60, 100, refine=5), name="a long load")
         for number in range(4):
-            server.submit(talkative(900, refine=3), name="waits %d" % number)
+            server.submit(stepped(60, 101 + number, refine=5), name="waits %d" % number)
         page.goto(server.url + "/#/jobs/" + job)
         page.get_by_text("so far").wait_for(timeout=60_000)
         page.wait_for_timeout(1000)

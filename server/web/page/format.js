@@ -197,3 +197,16 @@ export function typedNumbers(text) {
   if (!numbers.length || numbers.some((value) => !Number.isFinite(value))) return { fault: `"${text}" is no number, and no list of numbers such as 0.1, 0.2, 0.3.` };
   return { numbers };
 }
+
+/**
+ * Round numbers within a range, for an axis: four to ten of them.
+ * @param {number} low
+ * @param {number} high
+ */
+export function ticks(low, high) {
+  const power = 10 ** Math.floor(Math.log10((high - low) / 4));
+  const step = [1, 2, 5].map((part) => part * power).findLast((part) => (high - low) / part >= 4) ?? power;
+  const first = Math.ceil(low / step);
+  // a range of a few last digits of large numbers has no such numbers
+  return Number.isFinite(first) ? Array.from({ length: Math.min(11, Math.floor(high / step) - first + 1) }, (_, n) => (first + n) * step) : [];
+}

@@ -353,20 +353,23 @@ class CompareView {
     const at = (/** @type {number} */ x, /** @type {number} */ y) => [left + ((x - x0) / (x1 - x0)) * (right - left), bottom - ((y - y0) / (y1 - y0)) * (bottom - top)];
     context.strokeStyle = css("--line");
     context.fillStyle = css("--quiet");
-    for (let n = 0; n <= 4; n += 1) {
-      const [x, y] = [x0 + (n / 4) * (x1 - x0), y0 + (n / 4) * (y1 - y0)];
-      const [px = 0, py = 0] = at(x, y);
-      context.beginPath();
+    context.beginPath();
+    context.textAlign = "center";
+    for (const x of format.ticks(x0, x1)) {
+      const [px = 0] = at(x, y0);
       context.moveTo(px, top);
       context.lineTo(px, bottom);
+      const text = format.number(x, 6);
+      context.fillText(text, Math.min(px, width - 2 - context.measureText(text).width / 2), bottom + 16);
+    }
+    context.textAlign = "right";
+    for (const y of format.ticks(y0, y1)) {
+      const [, py = 0] = at(x0, y);
       context.moveTo(left, py);
       context.lineTo(right, py);
-      context.stroke();
-      context.textAlign = "center";
-      context.fillText(format.number(x, 4), px, bottom + 16);
-      context.textAlign = "right";
-      context.fillText(format.number(y, 4), left - 6, py + 4);
+      context.fillText(format.number(y, 6), left - 6, py + 4);
     }
+    context.stroke();
     context.textAlign = "center";
     context.fillText(this.x, (left + right) / 2, height - 8);
     context.fillStyle = css("--curve-1");
