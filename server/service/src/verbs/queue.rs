@@ -67,8 +67,8 @@ pub struct WaitingJob {
     pub position: i64,
     /// Why it waits.
     pub reason: Reason,
-    /// In how many seconds it starts, if jobs run as long as those that ended last; absent if that is unknown, and while the
-    /// queue is paused.
+    /// In how many seconds it starts, if jobs run as long as those that ended last, and one that has run longer takes as
+    /// long again; absent if that is unknown, and while the queue is paused.
     pub starts_in_s: Option<f64>,
 }
 
@@ -120,13 +120,13 @@ pub fn waiting<'a>(
         let rest = |job: &Job| {
             let told = job.progress.as_ref().and_then(|progress| progress.eta_s);
             let ran = job.started_at.map_or(0.0, |start| start.seconds_until(now));
-            Some(told.unwrap_or((mean? - ran).max(0.0)))
+            Some(told.unwrap_or(rest_of(ran, mean?)))
         };
         let rests: Vec<f64> = running.iter().filter_map(rest).collect();
         queued.sort_by_key(|job| job.queue.as_ref().map_or(i64::MAX, |queue| queue.position));
+        let mut starts = mean.map(|mean| starts(&rests, state.workers, mean));
         let waiting = queued.into_iter().filter_map(|job| {
             let queue = job.queue?;
-            let starts = |mean| starts_in(&rests, state.workers.max(1), queue.ahead, mean);
             let known = !state.paused && queue.position > 0;
             Some(WaitingJob {
                 id: job.id,
@@ -134,7 +134,10 @@ pub fn waiting<'a>(
                 owner: job.owner,
                 position: queue.position,
                 reason: queue.reason,
-                starts_in_s: mean.filter(|_| known).map(starts),
+                starts_in_s: starts
+                    .as_mut()
+                    .filter(|_| known)
+                    .map(|starts| starts(queue.ahead)),
             })
         });
         Ok(Forecast {
@@ -144,25 +147,30 @@ pub fn waiting<'a>(
     })
 }
 
-/// In how many seconds a job starts that has `ahead` others before it, each of which takes the mean time. `rests`: how long the
-/// running jobs still take.
-fn starts_in(rests: &[f64], workers: u32, ahead: i64, mean: f64) -> f64 {
+/// How long a job still runs that has run for `ran` seconds, where others take `mean` seconds: once it has taken longer, it is
+/// of another kind, of which only its own time is known.
+fn rest_of(ran: f64, mean: f64) -> f64 {
+    if ran < mean { mean - ran } else { ran }
+}
+
+/// In how many seconds jobs start, by how many others are before each of them, of which each takes `mean` seconds; to be asked in
+/// the order of the queue. `rests`: how long the running jobs still take.
+fn starts(rests: &[f64], workers: u32, mean: f64) -> impl FnMut(i64) -> f64 {
     let mut free: Vec<f64> = rests.to_vec();
-    free.resize(free.len().max(workers as usize), 0.0);
-    free.sort_by(f64::total_cmp);
-    // each in turn takes the worker that is free first; after a whole round all have become later by the mean
-    let rounds = ahead.max(0) as usize / free.len();
-    let mut at = ahead.max(0) as usize % free.len();
-    let mut shifted: Vec<f64> = free
-        .iter()
-        .map(|rest| rest + rounds as f64 * mean)
-        .collect();
-    while at > 0 {
-        shifted.sort_by(f64::total_cmp);
-        shifted[0] += mean;
-        at -= 1;
+    free.resize(free.len().max(workers.max(1) as usize), 0.0);
+    let mut begun = 0;
+    move |ahead| {
+        // each in turn takes the worker that is free first
+        loop {
+            let first = free.iter_mut().min_by(|a, b| a.total_cmp(b));
+            let Some(first) = first else { return 0.0 };
+            if begun >= ahead {
+                return *first;
+            }
+            *first += mean;
+            begun += 1;
+        }
     }
-    shifted.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -199,4 +207,19 @@ pub fn resume<'a>(
         })
         .await
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_that_outran_the_others_is_expected_to_take_as_long_again() {
+        assert_eq!((rest_of(0.1, 0.25), rest_of(7.0, 0.25)), (0.15, 7.0));
+        // two workers, busy for 7 s and 1 s: the second takes the next three
+        let two = |rests| (0..6).map(starts(rests, 2, 2.0)).collect::<Vec<f64>>();
+        assert_eq!(two(&[7.0, 1.0]), [1.0, 3.0, 5.0, 7.0, 7.0, 9.0]);
+        // an idle worker takes the next at once
+        assert_eq!(two(&[7.0])[..2], [0.0, 2.0]);
+    }
 }
