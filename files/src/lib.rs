@@ -46,6 +46,7 @@
 //! | fields as VTU | `vtu.rs` |
 //! | principal stresses | `stress.rs` |
 //! | fields as the service stores them | `columns` |
+//! | the compressor of each thread | `deflate.rs` |
 //! | figures | `plot` |
 
 // In: problems as JSON, and sweeps of them; meshes as Gmsh files and as decks of Abaqus or CalculiX.
@@ -75,7 +76,8 @@ pub mod stress;
 pub mod table;
 pub mod vtu;
 
-mod number; // what these share
+pub mod deflate; // what these share
+mod number;
 
 pub use external::external_mesh;
 pub use file::{MeshFormat, read_mesh};

@@ -6,8 +6,9 @@
 use std::io::Write;
 
 use base64::{Engine, engine::general_purpose::STANDARD as BASE64};
-use flate2::{Compression, write::ZlibEncoder};
+use flate2::write::ZlibEncoder;
 
+use crate::deflate;
 use crate::fields::{Data, check, plane, point_data};
 use crate::number::Number;
 use solver::element::Family;
@@ -102,7 +103,7 @@ fn data_array<T: Number>(
         block.iter().for_each(|value| value.put(&mut plain));
         let before = compressed.len();
         // computed digits compress little at any level
-        let mut encoder = ZlibEncoder::new(&mut compressed, Compression::fast());
+        let mut encoder = ZlibEncoder::new(&mut compressed, deflate::FAST);
         encoder.write_all(&plain)?;
         encoder.finish()?;
         ((compressed.len() - before) as i64).put(&mut header);

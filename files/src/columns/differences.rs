@@ -6,7 +6,9 @@
 
 use std::io::{Read, Write};
 
-use flate2::{Compression, read::DeflateDecoder, write::DeflateEncoder};
+use flate2::{read::DeflateDecoder, write::DeflateEncoder};
+
+use crate::deflate::{FAST, deflating};
 
 use super::{
     head::{Head, damaged, put_size, take_size},
@@ -135,15 +137,15 @@ impl Writer {
         let mut out = Vec::new();
         head.write(&mut out);
         out.extend(&self.random);
-        let level = if self.stream.len() > LARGE {
-            Compression::fast()
-        } else {
-            Compression::best()
-        };
-        let mut deflate = DeflateEncoder::new(out, level);
-        // writing to memory does not fail
-        let _ = deflate.write_all(&self.stream);
-        deflate.finish().unwrap_or_default()
+        if self.stream.len() > LARGE {
+            let mut deflate = DeflateEncoder::new(out, FAST);
+            // writing to memory does not fail
+            let _ = deflate.write_all(&self.stream);
+            return deflate.finish().unwrap_or_default();
+        }
+        let (_, deflated) = deflating(|deflate| deflate.write_all(&self.stream));
+        out.extend(deflated);
+        out
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::io::{self, BufWriter, Read, Write};
 
-use files::{columns, fields_json::FieldsJson};
-use flate2::{Compression, read::DeflateDecoder, write::DeflateEncoder};
+use files::{columns, deflate::deflating, fields_json::FieldsJson};
+use flate2::{read::DeflateDecoder, write::DeflateEncoder};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use solver::solution::Fields;
@@ -109,12 +109,12 @@ pub(super) fn info_of_fields(fields: &Fields) -> serde_json::Result<PartInfo> {
 
 /// The size and hash of the JSON of `value`, and the deflated JSON. The plain JSON is never in memory as a whole.
 pub(super) fn deflated_json(value: &impl Serialize) -> serde_json::Result<(PartInfo, Vec<u8>)> {
-    struct Sink {
+    struct Sink<'a> {
         bytes: u64,
         hash: Sha256,
-        deflate: DeflateEncoder<Vec<u8>>,
+        deflate: &'a mut DeflateEncoder<Vec<u8>>,
     }
-    impl Write for Sink {
+    impl Write for Sink<'_> {
         fn write(&mut self, text: &[u8]) -> io::Result<usize> {
             self.bytes += text.len() as u64;
             self.hash.update(text);
@@ -126,39 +126,33 @@ pub(super) fn deflated_json(value: &impl Serialize) -> serde_json::Result<(PartI
             Ok(())
         }
     }
-    let sink = Sink {
-        bytes: 0,
-        hash: Sha256::new(),
-        deflate: deflate(),
-    };
-    // numbers and names come one by one
-    let mut sink = BufWriter::with_capacity(AT_ONCE, sink);
-    serde_json::to_writer(&mut sink, value)?;
-    let sink = sink
-        .into_inner()
-        .map_err(|error| serde_json::Error::io(error.into_error()))?;
-    let info = PartInfo {
-        bytes: sink.bytes,
-        digest: sink.hash.finalize().to_vec(),
-    };
-    let mut body = sink.deflate.finish().map_err(serde_json::Error::io)?;
-    body.shrink_to_fit();
-    Ok((info, body))
+    let (info, body) = deflating(|deflate| {
+        let sink = Sink {
+            bytes: 0,
+            hash: Sha256::new(),
+            deflate,
+        };
+        // numbers and names come one by one
+        let mut sink = BufWriter::with_capacity(AT_ONCE, sink);
+        serde_json::to_writer(&mut sink, value)?;
+        let sink = sink
+            .into_inner()
+            .map_err(|error| serde_json::Error::io(error.into_error()))?;
+        Ok(PartInfo {
+            bytes: sink.bytes,
+            digest: sink.hash.finalize().to_vec(),
+        })
+    });
+    Ok((info?, body))
 }
 
 /// The number of bytes of JSON that are hashed and deflated at a time.
 const AT_ONCE: usize = 16 << 10;
 
-fn deflate() -> DeflateEncoder<Vec<u8>> {
-    DeflateEncoder::new(Vec::new(), Compression::new(6))
-}
-
-/// The deflated text. Level 6 is the usual one: 9 takes several times as long for a few per cent.
+/// The deflated text.
 pub(super) fn deflated(text: &[u8]) -> Vec<u8> {
-    let mut deflate = deflate();
-    // writing to memory does not fail
-    let _ = deflate.write_all(text);
-    deflate.finish().unwrap_or_default()
+    let (_, body) = deflating(|deflate| deflate.write_all(text));
+    body
 }
 
 #[cfg(test)]
