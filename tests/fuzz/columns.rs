@@ -178,7 +178,14 @@ fn changed_columns_are_read_or_refused() {
 }
 
 fn seeds() -> Vec<Vec<u8>> {
-    let shapes = [(8, 0, 3), (8, 1, 3), (12, 3, 2), (30, 8, 3)];
+    let shapes = [
+        (8, 0, 3),
+        (8, 1, 3),
+        (12, 3, 2),
+        (30, 8, 3),
+        (20, 5, 1),
+        (40, 12, 2),
+    ];
     let made = (0..).zip(shapes);
     made.map(|(seed, (nodes, elements, order))| {
         let (fields, law) = fields(nodes, elements, order, seed);

@@ -120,7 +120,7 @@ fn attack(
     };
     let figures = target.attack(read);
     // many kinds of refusal were reached
-    assert!(figures.answers > 15, "{figures:?}");
+    assert!(figures.answers > 20, "{figures:?}");
     // inputs have up to 128 KiB, the corpus some thousand of them; the tests run side by side
     // the kernel counts in batches: its highest figure may fall a little
     let grown = memory("VmHWM").saturating_sub(before);
