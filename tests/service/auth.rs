@@ -116,7 +116,15 @@ type Case = (String, Option<String>, Option<&'static [&'static str]>);
 struct Cases(Vec<Case>);
 
 /// What an administrator may use.
-const EVERYTHING: &[&str] = &["open", "identified", "read", "submit", "cancel", "admin"];
+const EVERYTHING: &[&str] = &[
+    "open",
+    "identified",
+    "read",
+    "submit",
+    "cancel",
+    "work",
+    "admin",
+];
 
 pub(crate) async fn create(server: &Server, admin: Option<&str>, body: Value) -> (String, String) {
     let mut request = server.post("/v1/tokens").json(&body);
@@ -168,6 +176,7 @@ async fn with_tokens() -> (Server, String, Cases) {
         ("read", &["open", "identified", "read"][..]),
         ("submit", &["open", "identified", "submit"]),
         ("cancel", &["open", "identified", "cancel"]),
+        ("work", &["open", "identified", "work"]),
         ("read+submit", &["open", "identified", "read", "submit"]),
         ("admin", EVERYTHING),
     ] {
@@ -328,6 +337,18 @@ async fn every_rpc_is_for_those_whom_the_policy_names() {
         (
             "/signorini.v1.JobService/NoSuchRpc".to_owned(),
             "identified",
+        ),
+        (
+            "/signorini.worker.v1.WorkerService/Lease".to_owned(),
+            "work",
+        ),
+        (
+            "/signorini.worker.v1.WorkerService/Report".to_owned(),
+            "work",
+        ),
+        (
+            "/signorini.worker.v1.WorkerService/GetContent".to_owned(),
+            "work",
         ),
     ];
     let channel = Channel::from_shared(server.url.clone())

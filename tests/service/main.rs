@@ -41,6 +41,7 @@ mod views;
 mod waiting;
 mod watch;
 mod watch_list;
+mod workers;
 
 /// The binary under test.
 const SIGNORINI: &str = env!("CARGO_BIN_EXE_signorini");

@@ -107,7 +107,9 @@ fn worker_process() -> Command {
         env::current_exe().unwrap_or_else(|_| env!("CARGO_PKG_NAME").into())
     };
     let mut command = Command::new(program);
-    command.arg0(env!("CARGO_PKG_NAME")).arg(WORKER); // as `ps` shows it
+    command
+        .arg0(env!("CARGO_PKG_NAME"))
+        .args([WORKER, "--stdin"]); // as `ps` shows it
     if let Some(format) = LOG_FORMAT.get() {
         command.env("SIGNORINI_LOG_FORMAT", format.to_string());
     }
@@ -217,6 +219,7 @@ impl App {
             None => None,
         };
         let queue = Queue::new(store.clone(), solver, config.workers);
+        queue.set_lease(Duration::from_secs(config.lease_s.into()));
         let service = Arc::new(Service::new(config.clone(), store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;
         let router = rest::router(service, grpc);

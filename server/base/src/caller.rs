@@ -33,6 +33,8 @@ pub enum Scope {
     Submit,
     /// Cancel and delete jobs, delete meshes.
     Cancel,
+    /// Solve the jobs of every owner as a worker elsewhere: receive their problems, and report their results.
+    Work,
     /// All of the other scopes for the jobs of every owner; also pause the queue, manage tokens, and give priorities
     /// above 0.
     Admin,

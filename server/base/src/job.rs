@@ -404,6 +404,8 @@ pub enum Waiting {
     WorkersBusy,
     /// A worker is idle, but the running jobs leave too little of the memory budget for the next job.
     Memory,
+    /// No worker that is there has the memory that the job needs.
+    NoWorkerFits,
     /// The queue is paused.
     Paused,
     /// The disk has no room for results; jobs start again when there is some.

@@ -8,7 +8,7 @@ use std::{
     cell::Cell,
     sync::{
         Arc,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
 };
 
@@ -27,11 +27,15 @@ const LEAST_MARGIN: u64 = 4 << 20;
 #[derive(Debug)]
 pub struct Budget {
     bytes: u64,
+    /// How many jobs run at the same time here.
+    jobs: u16,
     /// The memory that each job may use beyond its estimate (bytes).
     margin: u64,
     state: Mutex<State>,
     /// Whether the next job of the queue waits for memory.
     short: AtomicBool,
+    /// The memory of the largest worker elsewhere (bytes); 0 without one.
+    elsewhere: AtomicU64,
 }
 
 #[derive(Debug)]
@@ -47,18 +51,45 @@ impl Budget {
     pub fn new(bytes: u64, jobs: u16, of_bodies: u64) -> Arc<Budget> {
         Arc::new(Budget {
             bytes,
+            jobs,
             margin: (MARGINS / u64::from(jobs.max(1))).max(LEAST_MARGIN),
             state: Mutex::new(State {
                 reserved: 0,
                 bodies: Bodies::new(of_bodies),
             }),
             short: AtomicBool::new(false),
+            elsewhere: AtomicU64::new(0),
         })
     }
 
     /// The size of the budget (bytes).
     pub fn bytes(&self) -> u64 {
         self.bytes
+    }
+
+    /// The memory of the largest worker elsewhere (bytes); 0 without one.
+    pub fn elsewhere(&self) -> u64 {
+        self.elsewhere.load(Ordering::Relaxed)
+    }
+
+    /// Sets the memory of the largest worker elsewhere (bytes).
+    pub fn set_elsewhere(&self, bytes: u64) {
+        self.elsewhere.store(bytes, Ordering::Relaxed);
+    }
+
+    /// The memory that one job may need (bytes): here, or at the largest worker elsewhere.
+    pub fn largest(&self) -> u64 {
+        self.bytes.max(self.elsewhere())
+    }
+
+    /// Whether a job of this estimated memory (bytes; `None`: unknown) can be solved neither here nor by a worker that is there.
+    pub fn fits_nowhere(&self, needed: Option<u64>) -> bool {
+        let here = if self.jobs == 0 { 0 } else { self.bytes };
+        match (self.elsewhere(), here) {
+            // without workers elsewhere, a job of more than the budget runs alone
+            (0, here) => here == 0,
+            (elsewhere, here) => needed.is_some_and(|needed| needed > elsewhere.max(here)),
+        }
     }
 
     /// The memory that running jobs have reserved (bytes).

@@ -13,7 +13,11 @@ use axum::http::Uri;
 use clap::{Args, builder::OsStringValueParser};
 use hyper_util::client::proxy::matcher::Matcher;
 use reqwest::Client;
-use rustls::pki_types::{CertificateDer, pem::PemObject};
+use rustls::{
+    ClientConfig,
+    pki_types::{CertificateDer, pem::PemObject},
+};
+use rustls_platform_verifier::ConfigVerifierExt;
 
 use super::pinned;
 
@@ -56,6 +60,18 @@ impl Display for Proxy {
 }
 
 impl Trust {
+    /// Makes a TLS configuration for connections of HTTP/2 to the service.
+    pub(super) fn http2(&self) -> anyhow::Result<ClientConfig> {
+        provide();
+        let mut config = match self.ca.as_deref() {
+            Some(file) => pinned::trusting(authorities(file.as_ref())?)?,
+            None => ClientConfig::with_platform_verifier()
+                .context("TLS cannot be set up; --ca names the authority to trust")?,
+        };
+        config.alpn_protocols = vec![b"h2".to_vec()];
+        Ok(config)
+    }
+
     /// Makes a client for the service at this address.
     pub(super) fn client(&self, url: &str) -> anyhow::Result<Way> {
         provide();

@@ -32,6 +32,7 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         trust: ProxyTrust::default(),
         allow_unauthenticated: false,
         workers: 2,
+        lease_s: 30,
         isolation: Isolation::Thread,
         max_queued: 100,
         max_queued_per_owner: 100,

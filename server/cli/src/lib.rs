@@ -4,7 +4,7 @@
 //!
 //! | subject | where |
 //! |---|---|
-//! | commands of the service | `serve`, `token`, `backup`, `restore`, `doctor`, `health`, `config` |
+//! | commands of the service | `serve`, `worker`, `token`, `backup`, `restore`, `doctor`, `health`, `config` |
 //! | settings of `serve` and their sources | `settings` |
 //! | commands without a service | `solve`, `sweep`, `convert`, `demo`, `examples`, `explain` |
 //! | tokens for services | `login`, `kept_tokens` |
@@ -47,6 +47,7 @@ mod solve;
 mod sweep;
 mod table;
 mod token;
+mod worker;
 
 use std::{env, ffi::OsString, process::ExitCode};
 
@@ -125,9 +126,10 @@ enum Command {
     Completions(pages::Completions),
     /// Print or write the manual pages of the commands
     Man(pages::Man),
-    /// Solve the tasks that the service sends over standard input, for `serve --isolation process`
-    #[command(name = WORKER, hide = true)]
-    Worker,
+    /// Solve jobs of a service that runs elsewhere, until a signal or until there was no job for long. Exit code: 0 ended, 2
+    /// an invalid option, 1 the service does not accept this worker, or anything else
+    #[command(name = WORKER)]
+    Worker(worker::Arguments),
     /// Start a temporary service, let it solve the five examples over REST and gRPC, and show their verdicts and a figure
     Demo,
 }
@@ -210,9 +212,9 @@ pub fn main() -> ExitCode {
             };
             output::print(&text).map(|()| Exit::Ok).map_err(Into::into)
         }
-        Command::Worker => {
-            let _lines = log::start_of_worker();
-            with_runtime(serve::work())
+        Command::Worker(arguments) => {
+            let _lines = log::start_of_worker(arguments.log_level());
+            with_runtime(worker::run(arguments))
         }
         Command::Demo => {
             let _lines = log::start(LevelFilter::WARN);

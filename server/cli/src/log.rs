@@ -36,13 +36,10 @@ pub(super) fn start(default: LevelFilter) -> Log {
 }
 
 /// Starts the log of a worker process, which is part of the log of the service.
-pub(super) fn start_of_worker() -> Log {
+pub(super) fn start_of_worker(level: LevelFilter) -> Log {
     let asked = std::env::var("SIGNORINI_LOG_FORMAT").unwrap_or_default();
     let format = LogFormat::from_str(&asked, true).unwrap_or_default();
-    write(
-        quiet(Targets::new().with_default(LevelFilter::WARN)),
-        format,
-    )
+    write(quiet(Targets::new().with_default(level)), format)
 }
 
 /// Starts the log of the service.

@@ -133,28 +133,32 @@ impl Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
+/// The token of the environment, or else the one that `login` has kept for this address.
+pub(super) fn token_for(url: &str) -> anyhow::Result<Option<String>> {
+    let given = std::env::var("SIGNORINI_TOKEN").unwrap_or_default();
+    match given.trim() {
+        "" => {
+            let kept = kept_tokens::token_for(url)?;
+            if kept.is_none() {
+                let _ = OTHER_ADDRESSES.set(kept_tokens::addresses());
+            }
+            Ok(kept)
+        }
+        // no header can carry it
+        token if !token.bytes().all(|byte| byte.is_ascii_graphic()) => {
+            bail!(
+                "SIGNORINI_TOKEN is not a token: it has a space, a line break or a character that no token has"
+            );
+        }
+        token => Ok(Some(token.to_owned())),
+    }
+}
+
 impl Service {
     /// Prepares calls to the service at this address, with the token of the environment, or else the one that `login` has
     /// kept.
     pub(super) fn at(url: &str, trust: &Trust) -> anyhow::Result<Service> {
-        let given = std::env::var("SIGNORINI_TOKEN").unwrap_or_default();
-        let token = match given.trim() {
-            "" => {
-                let kept = kept_tokens::token_for(url)?;
-                if kept.is_none() {
-                    let _ = OTHER_ADDRESSES.set(kept_tokens::addresses());
-                }
-                kept
-            }
-            // no header can carry it
-            token if !token.bytes().all(|byte| byte.is_ascii_graphic()) => {
-                bail!(
-                    "SIGNORINI_TOKEN is not a token: it has a space, a line break or a character that no token has"
-                );
-            }
-            token => Some(token.to_owned()),
-        };
-        Service::with_token(url, trust, token)
+        Service::with_token(url, trust, token_for(url)?)
     }
 
     fn with_token(url: &str, trust: &Trust, token: Option<String>) -> anyhow::Result<Service> {

@@ -291,7 +291,7 @@ fn listed(tokens: &[Token]) -> String {
 }
 
 /// Reads a duration: seconds, or a number with one of the units s, m, h, d.
-fn duration_s(text: &str) -> Result<f64, String> {
+pub(super) fn duration_s(text: &str) -> Result<f64, String> {
     let (number, unit) = match text.strip_suffix(['s', 'm', 'h', 'd']) {
         Some(number) => (number, &text[number.len()..]),
         None => (text, "s"),

@@ -13,7 +13,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     for input in ["build", "../../proto"] {
         println!("cargo:rerun-if-changed={input}");
     }
-    let descriptors = protox::compile(["signorini/v1/signorini.proto"], ["../../proto"])?;
+    let contracts = [
+        "signorini/v1/signorini.proto",
+        "signorini/worker/v1/worker.proto",
+    ];
+    let descriptors = protox::compile(contracts, ["../../proto"])?;
     let out = PathBuf::from(env::var("OUT_DIR")?);
     fs::write(out.join("descriptors.bin"), descriptors.encode_to_vec())?;
     let pool = DescriptorPool::from_file_descriptor_set(descriptors.clone())?;

@@ -53,10 +53,15 @@ pub struct Config {
     #[arg(long, env = "SIGNORINI_ALLOW_UNAUTHENTICATED")]
     pub allow_unauthenticated: bool,
 
-    /// Jobs solved at the same time, each on one core
+    /// Jobs solved here at the same time, each on one core. 0: only workers elsewhere solve (`signorini worker`)
     #[arg(long, env = "SIGNORINI_WORKERS", default_value_t = 2, value_name = "N",
-          value_parser = clap::value_parser!(u16).range(1..=256))]
+          value_parser = clap::value_parser!(u16).range(..=256))]
     pub workers: u16,
+
+    /// Seconds after which a worker elsewhere that is not heard of is taken for lost, so that its jobs are requeued
+    #[arg(long, env = "SIGNORINI_LEASE_S", default_value_t = 30, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u16).range(2..=3600))]
+    pub lease_s: u16,
 
     /// Where jobs are solved: on threads of the service, or in processes, one for each worker and kept from job to job.
     /// In a process, a crash such as a stack overflow costs only the job that the process is solving
@@ -476,7 +481,7 @@ fn canonical(network: Ipv6Net) -> IpNet {
 
 fn scope(text: &str) -> Result<Scope, String> {
     text.parse()
-        .map_err(|_| "expected read, submit, cancel or admin".into())
+        .map_err(|_| "expected read, submit, cancel, work or admin".into())
 }
 
 /// Reads a path and removes a slash at its end; the root becomes empty.

@@ -1,10 +1,10 @@
 //! How the bytes of a stored part of a result are encoded: as plain JSON, deflated JSON, or columns.
 
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, BufReader, BufWriter, Read, Write};
 
 use files::{columns, deflate::deflating, fields_json::FieldsJson};
 use flate2::{read::DeflateDecoder, write::DeflateEncoder};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::IgnoredAny};
 use sha2::{Digest, Sha256};
 use solver::solution::Fields;
 
@@ -92,6 +92,37 @@ pub(super) fn info_of_json(json: &[u8]) -> PartInfo {
         bytes: json.len() as u64,
         digest: digest(json),
     }
+}
+
+/// The size and the hash of deflated JSON, which is never in memory as a whole; an error if it is not JSON.
+pub(super) fn info_if_json(stored: &[u8]) -> serde_json::Result<PartInfo> {
+    struct Seen<R> {
+        text: R,
+        bytes: u64,
+        hash: Sha256,
+    }
+    impl<R: Read> Read for Seen<R> {
+        fn read(&mut self, some: &mut [u8]) -> io::Result<usize> {
+            let count = self.text.read(some)?;
+            self.bytes += count as u64;
+            self.hash.update(&some[..count]);
+            Ok(count)
+        }
+    }
+    let seen = Seen {
+        text: DeflateDecoder::new(stored),
+        bytes: 0,
+        hash: Sha256::new(),
+    };
+    let mut text = BufReader::with_capacity(AT_ONCE, seen);
+    let mut json = serde_json::Deserializer::from_reader(&mut text);
+    IgnoredAny::deserialize(&mut json)?;
+    json.end()?;
+    let seen = text.into_inner();
+    Ok(PartInfo {
+        bytes: seen.bytes,
+        digest: seen.hash.finalize().to_vec(),
+    })
 }
 
 /// The size and the hash of the JSON of fields, which is never in memory as a whole.

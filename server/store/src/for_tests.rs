@@ -3,6 +3,9 @@
 
 use std::{fs, os::unix::fs::FileExt, path::Path, sync::Arc};
 
+use files::columns;
+use solver::solution::Fields;
+
 use crate::{
     connections::{Mode, open},
     database::Store,
@@ -76,6 +79,16 @@ impl Parts {
     /// The parts of a result that has nothing but a summary.
     pub fn of_a_summary() -> Parts {
         Parts::new(vec![parts::Part::new("summary".into(), b"{}")])
+    }
+
+    /// The parts of a result that has a summary and these fields.
+    pub fn of_fields(fields: &Fields) -> Parts {
+        let law = columns::Law {
+            axisymmetric: false,
+            moduli: vec![],
+        };
+        let fields = Part::of_fields(fields, &law).unwrap();
+        Parts::new(Parts::of_a_summary().into_parts().chain([fields]).collect())
     }
 }
 

@@ -171,6 +171,7 @@ use self::database::Rebuild;
 pub use self::{
     backup::{Backup, back_up},
     changes::{Changed, Changes, Recent},
+    claim::{Claims, Place, Room},
     content::{Fingerprint, PIECE_BYTES, PIECES_PER_COMMIT},
     database::Store,
     database::with_advice,
@@ -187,7 +188,7 @@ pub use self::{
     list::Keys,
     manifest::Manifest,
     meshes::{Removal, StoredMesh},
-    parts::{Part, Parts, ProfilePoints},
+    parts::{Part, Parts, ProfilePoints, check_parts},
     progress::accept,
     repeated_error::RepeatedError,
     restore::{Restored, restore},

@@ -8,16 +8,25 @@
 //! [`name::RESULT`]: super::content::name::RESULT
 //! [`name::FIELDS`]: super::content::name::FIELDS
 
-use std::{borrow::Cow, collections::BTreeMap};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, BTreeSet},
+};
 
 use base::run::{Document, Step};
 use files::columns;
 use serde::{Deserialize, Serialize};
-use solver::solution::{ContactProfile, Fields};
+use solver::{
+    error::shortened,
+    solution::{ContactProfile, Fields},
+};
 
 use super::{
     content::{Fingerprint, NewContent, name},
-    encoding::{Encoding, PartInfo, deflated, deflated_json, info_of_fields, info_of_json},
+    encoding::{
+        Decoded, Encoding, PartInfo, decoded, deflated, deflated_json, info_if_json,
+        info_of_fields, info_of_json,
+    },
 };
 
 /// The version of the stored form.
@@ -248,6 +257,50 @@ pub(super) fn read_index(stored: &[u8]) -> std::result::Result<Vec<Entry>, Strin
         return Err("the checksum of its index does not match its content".into());
     }
     postcard::from_bytes(index).map_err(|error| error.to_string())
+}
+
+/// Checks that parts which come from another machine can be served: a summary is there, no name twice, and the content of
+/// each part is JSON of the size and hash that it says, or fields of finite numbers. At most `most` bytes of memory are taken.
+/// `Err`: what is wrong.
+pub fn check_parts(parts: &[Part], most: u64) -> std::result::Result<(), String> {
+    let mut names = BTreeSet::new();
+    for part in parts {
+        let named = |why: String| format!("its part {:?}: {why}", shortened(&part.name, 100));
+        if !names.insert(&*part.name) {
+            return Err(named("there are two of this name".into()));
+        }
+        check_part(part, most).map_err(named)?;
+    }
+    match names.contains("summary") {
+        true => Ok(()),
+        false => Err("it has no summary".into()),
+    }
+}
+
+fn check_part(part: &Part, most: u64) -> std::result::Result<(), String> {
+    let info = match (part.encoding, part.is_fields()) {
+        (Encoding::Deflated, false) => {
+            info_if_json(&part.body).map_err(|error| error.to_string())?
+        }
+        (Encoding::Columns, true) => {
+            let memory = columns::memory_to_decode(&part.body)? as u64;
+            if memory > most {
+                return Err(format!("{memory} bytes of memory are needed to read it"));
+            }
+            let (info, fields) = decoded(part.body.clone(), part.encoding, &part.info)?;
+            if let Decoded::Fields(fields) = fields
+                && !fields.is_finite()
+            {
+                return Err("a number is not finite".into());
+            }
+            info
+        }
+        (encoding, _) => return Err(format!("it is encoded as {encoding:?}")),
+    };
+    match info == part.info {
+        true => Ok(()),
+        false => Err("its content is not what its size and hash say".into()),
+    }
 }
 
 /// The points at which a stored profile has its values.

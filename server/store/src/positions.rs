@@ -46,7 +46,7 @@ impl Store {
             let Some(primary) = job.coalesced_into else {
                 // none if it has been started since it was read
                 let ahead = queue.ahead(job)?;
-                let reason = self.why_it_waits(queue.running_of(&job.owner));
+                let reason = self.why_it_waits(job, queue.running_of(&job.owner));
                 job.queue = ahead.map(|ahead| position(ahead, reason));
                 continue;
             };
@@ -69,13 +69,15 @@ impl Store {
     }
 
     /// Why a job waits for a worker, if its owner has this many running jobs.
-    fn why_it_waits(&self, running: i64) -> Waiting {
+    fn why_it_waits(&self, job: &Job, running: i64) -> Waiting {
         if self.is_paused() {
             Waiting::Paused
         } else if self.reserve.was_disk_full() {
             Waiting::LowDisk
         } else if running >= self.most_running_of_owner() {
             Waiting::OwnerLimit
+        } else if self.budget().fits_nowhere(job.memory_bytes) {
+            Waiting::NoWorkerFits
         } else if self.budget().is_short() {
             Waiting::Memory
         } else {

@@ -116,8 +116,9 @@ pub struct Claim {
     pub problem: String,
     /// The hash of the stored mesh that the problem names.
     pub mesh: Option<String>,
-    /// The memory that is reserved for the job until its solver has returned.
-    pub memory: Reservation,
+    /// The memory that is reserved for the job until its solver has returned; `None` at a worker elsewhere, which reserves it
+    /// itself.
+    pub memory: Option<Reservation>,
 }
 
 /// The largest number of submissions that share a commit.

@@ -18,7 +18,8 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::{
     change::Change,
-    claim, coalescing,
+    claim::{self, Place},
+    coalescing,
     connections::closed,
     content::{self, Holder, NewContent, name},
     database::{Store, Writer},
@@ -182,7 +183,8 @@ fn accept(change: &mut Change<'_>, submission: Submission, claim: bool) -> Resul
     if let Some(key) = &key {
         keys::remember(change, &owner, key, &inserted)?;
     }
-    let claim = if claim { claim::claim(change)? } else { None };
+    let places: &[Place] = if claim { &[Place::Here] } else { &[] };
+    let claim = claim::claim(change, places)?.pop().map(|(_, claim)| claim);
     let mut accepted = vec![];
     for key in inserted {
         accepted.push(change.read(key)?);

@@ -132,10 +132,10 @@ impl Store {
 }
 
 impl Change<'_> {
-    /// The key of the next job of the queue, except the damaged ones.
-    pub(super) fn next(&mut self, damaged: &BTreeSet<i64>) -> Result<Option<i64>> {
+    /// The key of the next job of the queue, except those that are passed over.
+    pub(super) fn next(&mut self, passed: &BTreeSet<i64>) -> Result<Option<i64>> {
         let most_running = self.store().most_running_of_owner();
-        next(self.sql()?, damaged, most_running)
+        next(self.sql()?, passed, most_running)
     }
 
     /// Records that an owner has a turn.
@@ -160,14 +160,14 @@ impl Change<'_> {
     }
 }
 
-/// The key of the next job of the queue, except the damaged ones.
+/// The key of the next job of the queue, except those that are passed over.
 pub(super) fn next(
     connection: &Connection,
-    damaged: &BTreeSet<i64>,
+    passed: &BTreeSet<i64>,
     most_running: i64,
 ) -> Result<Option<i64>> {
-    let damaged = serde_json::to_string(damaged)?;
-    connection.row(NEXT, (damaged, most_running), |row| Ok(row.get("first")?))
+    let passed = serde_json::to_string(passed)?;
+    connection.row(NEXT, (passed, most_running), |row| Ok(row.get("first")?))
 }
 
 fn queued(connection: &Connection) -> Result<usize> {

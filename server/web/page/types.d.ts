@@ -887,7 +887,7 @@ export type Rotation = {
   "angular_velocity": number;
 };
 
-export type Scope = "read" | "submit" | "cancel" | "admin";
+export type Scope = "read" | "submit" | "cancel" | "work" | "admin";
 
 export type ServiceLimits = {
   "body_cache_bytes": number;
@@ -1151,7 +1151,7 @@ export type Violation = {
   "reason": (Reason2);
 };
 
-export type Waiting = "workers_busy" | "memory" | "paused" | "low_disk" | "owner_limit" | "coalesced";
+export type Waiting = "workers_busy" | "memory" | "no_worker_fits" | "paused" | "low_disk" | "owner_limit" | "coalesced";
 
 export type WaitingJob = {
   "id": JobId;

@@ -858,7 +858,7 @@ pub struct Fields {
 impl Fields {
     /// Whether all fields are finite. Checked column by column: they are nearly all numbers of a large solution, and
     /// serializing them would take ten times as long.
-    fn is_finite(&self) -> bool {
+    pub fn is_finite(&self) -> bool {
         let Fields {
             x,
             y,

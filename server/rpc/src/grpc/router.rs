@@ -11,8 +11,10 @@ use service::{
 use tonic::{Code, Status, server::NamedService, service::Routes};
 use tonic_health::server::HealthReporter;
 
-use super::service::Grpc;
-use crate::pb::{self, job_service_server::JobServiceServer};
+use super::{service::Grpc, workers::Workers};
+use crate::pb::{
+    self, job_service_server::JobServiceServer, worker::worker_service_server::WorkerServiceServer,
+};
 
 /// Makes the gRPC routes, which share a port with REST, and the handle that sets the reported health.
 pub fn router(
@@ -32,9 +34,12 @@ async fn routes(
     let (reporter, health) = tonic_health::server::health_reporter();
     reporter.set_serving::<JobServiceServer<Grpc>>().await;
     tokio::spawn(report_health(reporter.clone(), service.clone()));
+    let workers = WorkerServiceServer::new(Workers::new(service.clone()))
+        .max_decoding_message_size(MAX_MESSAGE_BYTES);
     let jobs =
         JobServiceServer::new(Grpc::new(service)).max_decoding_message_size(MAX_MESSAGE_BYTES);
     let routes = Routes::new(jobs)
+        .add_service(workers)
         .add_service(health)
         .add_service(reflection().build_v1()?)
         .add_service(reflection().build_v1alpha()?);

@@ -6,14 +6,15 @@ use base::{
     failpoint::{self, Point},
     time::Time,
 };
-use store::{Accepted, Claim, RepeatedError, Result, Submission};
+use store::{Accepted, Claim, Claims, Place, RepeatedError, Result, Submission};
 use tokio::sync::OwnedSemaphorePermit;
 use tracing::error;
 
 use super::{
+    leases::Offer,
     running::Running,
     state::{Queue, Slot, Solver},
-    worker,
+    worker::{self, Seat},
 };
 
 /// How often the time limits of waiting jobs are checked.
@@ -68,10 +69,8 @@ impl Queue {
         let mut starting = RepeatedError::new("no job can be started");
         loop {
             // a notification from here on is kept for the wait below, so that none is missed
-            while self.store.waiting() > 0
-                && let Some(slot) = self.free_slot()
-            {
-                match starting.note(self.claim(slot).await) {
+            while self.store.waiting() > 0 {
+                match starting.note(self.claim().await) {
                     Some(true) => {}
                     Some(false) => break,
                     None => tokio::time::sleep(CHECK_INTERVAL).await, // the disk may be full for a while
@@ -92,38 +91,56 @@ impl Queue {
         self.slots.clone().try_acquire_owned().ok()
     }
 
-    /// Claims the next job for a worker, or ends jobs that can be answered from earlier results; false if it did
-    /// neither.
-    async fn claim(self: &Arc<Self>, slot: OwnedSemaphorePermit) -> Result<bool> {
+    /// Claims the next jobs for the idle workers, here and elsewhere, or ends jobs that can be answered from earlier results;
+    /// false if it did neither.
+    async fn claim(self: &Arc<Self>) -> Result<bool> {
         let _guard = self.claiming.read().await;
+        let most = self.store.waiting();
+        let mut slots: Vec<_> = (0..most).map_while(|_| self.free_slot()).collect();
         if self.stopping.is_cancelled() || self.store.is_paused() {
             return Ok(false);
         }
-        let (claim, changed) = self.store.claim_next().await?;
-        self.announce(&changed);
-        match claim {
-            Some(claim) => self.start_worker(claim, slot),
-            None if changed.is_empty() => return Ok(false),
-            None => {} // some were answered from results; there may be more
+        let mut offers = Offers::take(self, most);
+        if slots.is_empty() && offers.taken.is_empty() {
+            return Ok(false);
         }
-        Ok(true)
+        let away = offers.taken.iter().flatten();
+        let away = away.map(|offer| Place::Away(offer.room));
+        let here = slots.iter().map(|_| Place::Here);
+        let Claims { claims, changed } = self.store.claim_for(away.chain(here).collect()).await?;
+        self.announce(&changed);
+        // some may have been answered from results; there may be more
+        let any = !claims.is_empty() || !changed.is_empty();
+        for (place, claim) in claims {
+            // the slots come after the offers, and are all alike
+            match offers.taken.get_mut(place).and_then(Option::take) {
+                Some(offer) => self.start_attempt(claim, Seat::Elsewhere(offer)),
+                None => {
+                    if let Some(slot) = slots.pop() {
+                        self.start_worker(claim, slot);
+                    }
+                }
+            }
+        }
+        Ok(any)
     }
 
     /// Gives a claimed job to a worker. Call this while `claiming` is held.
     fn start_worker(self: &Arc<Self>, claim: Claim, slot: OwnedSemaphorePermit) {
-        failpoint::pass(Point::Given, claim.job.id);
-        let running = Running {
-            id: claim.job.id,
-            attempt: claim.job.attempt,
-            stop: Arc::default(),
-        };
-        self.running().insert(claim.job.key, running.clone());
-        let queue = self.clone();
-        let slot = Arc::new(Slot {
+        let slot = Slot {
             permit: Some(slot),
             queue: self.clone(),
-        });
-        tokio::spawn(async move { worker::run_attempt(&queue, claim, running, slot).await });
+        };
+        self.start_attempt(claim, Seat::Here(Arc::new(slot)));
+    }
+
+    /// Starts an attempt of a claimed job. Call this while `claiming` is held.
+    fn start_attempt(self: &Arc<Self>, claim: Claim, seat: Seat) {
+        failpoint::pass(Point::Given, claim.job.id);
+        let running = Running::begin(&claim.job, matches!(seat, Seat::Here(_)));
+        self.running().insert(claim.job.key, running.clone());
+        let queue = self.clone();
+        tokio::spawn(async move { worker::run_attempt(&queue, claim, running, seat).await });
     }
 
     /// Jobs that are running according to the store, but that no worker has: their keys and attempts.
@@ -186,6 +203,29 @@ impl Queue {
                 () = tokio::time::sleep(CHECK_INTERVAL) => {}
                 () = self.stopping.cancelled() => return,
             }
+        }
+    }
+}
+
+/// Offers of workers elsewhere that were taken; those that got no job are given back when this is dropped.
+struct Offers<'a> {
+    queue: &'a Queue,
+    /// `None`: the offer has got a job.
+    taken: Vec<Option<Offer>>,
+}
+
+impl Offers<'_> {
+    fn take(queue: &Queue, most: usize) -> Offers<'_> {
+        let taken = queue.leases.take_offers(most);
+        let taken = taken.into_iter().map(Some).collect();
+        Offers { queue, taken }
+    }
+}
+
+impl Drop for Offers<'_> {
+    fn drop(&mut self) {
+        for Offer { worker, number, .. } in self.taken.iter().flatten() {
+            self.queue.leases.give_back(worker, *number);
         }
     }
 }

@@ -30,7 +30,7 @@ pub(super) struct Solved {
 
 /// Why an attempt to solve a job has no solution.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) enum NoSolution {
+pub enum NoSolution {
     /// The solver was asked to stop before it had a state to return.
     Stopped,
     /// The job needs more memory than its share.
@@ -39,8 +39,10 @@ pub(super) enum NoSolution {
     Failed(Reason, String),
     /// An error of the service, not of the client.
     Internal(String),
-    /// The worker process that solved the job died, for the reason given in words.
+    /// The worker that solved the job was lost, for the reason given in words.
     Lost(String),
+    /// The worker that solved the job has given it back, since it is to end.
+    GivenBack,
 }
 
 impl From<SolveError> for NoSolution {
@@ -169,8 +171,9 @@ pub(super) fn ending_of_attempt(
         NoSolution::Stopped => stopped_for(job, stopped),
         NoSolution::OutOfMemory(outgrown) => out_of_memory(outgrown),
         NoSolution::Failed(reason, detail) => Ending::failed(reason, detail),
-        // (the worker requeues a job whose process was lost)
+        // (a job whose worker was lost or has given it back is requeued)
         NoSolution::Internal(cause) | NoSolution::Lost(cause) => internal(job, &cause),
+        NoSolution::GivenBack => internal(job, &"it was given back"),
     };
     (ending, None)
 }

@@ -1,7 +1,7 @@
 //! The queue: its tasks, and what wakes each of them.
 //!
-//! `workers` slots each hold one job at a time. The dispatcher claims the next job of the store whenever a slot is
-//! free; a submission that finds a free slot claims a job in its own transaction, and starts this job in the slot. Each
+//! `workers` slots each hold one job at a time, and so do the slots of workers elsewhere (`leases`), which ask for jobs. The
+//! dispatcher claims the next jobs of the store whenever slots are free; a submission that finds a free slot claims a job in its own transaction, and starts this job in the slot. Each
 //! claim is solved on a blocking thread, or in a process that such a thread feeds (`process`). For each running solver
 //! a recorder task commits its events in batches and then announces that there are new ones; watchers read them from
 //! the store, together. No event travels through a channel to a watcher, so none is repeated, missed, or undone by a
@@ -31,7 +31,8 @@
 //! | starting jobs when a slot is free; periodic tasks | `dispatch` |
 //! | one job: its worker, its solution on a blocking thread or in a process, its end | `worker`, `solving`, `process`, `ending` |
 //! | what a solver tells and asks, here or in a process | `supervisor` |
-//! | events committed in batches | `recorder` |
+//! | jobs at workers elsewhere: offers, leases, reports | `leases`, `elsewhere` |
+//! | events committed in batches | `recorder`, `batch` |
 //! | stopping solvers | `cancel`, `running` |
 //! | watchers: woken, and served from one reading of the store | `watchers`, `feed` |
 //! | metrics and spans of an attempt | `phases` |
@@ -42,6 +43,7 @@
 
 // In order of use: no file uses one below it.
 mod backoff;
+mod batch;
 mod feed;
 mod load;
 mod running;
@@ -53,10 +55,12 @@ mod supervisor;
 mod ending;
 mod solving;
 
+mod leases;
 mod process;
 
 mod state;
 
+mod elsewhere;
 mod recorder;
 mod worker;
 
@@ -67,9 +71,15 @@ mod dispatch;
 mod tests;
 
 pub use self::{
+    elsewhere::TooManyWorkers,
     feed::News,
+    leases::{
+        About, Ask, End, Granted, JobAnswer, JobReport, Pace, Packed, Piece, Report, Task,
+        WorkerId, solve_leased,
+    },
     load::LoadPoint,
     process::{Processes, run_worker_process},
     state::{Queue, Solver, State},
+    supervisor::Supervisor,
     watchers::Subscription,
 };

@@ -1,15 +1,14 @@
 //! Records the reports of a running solver: commits its events in batches, then announces them.
 
-use std::{sync::Arc, time::Duration};
+use std::{sync::atomic::Ordering::Relaxed, time::Duration};
 
 use base::{
     event::{Payload, TimedIteration},
     failpoint::{self, Point},
     job::{Job, Progress},
-    sweep::MemberRow,
     time::Time,
 };
-use store::{FinalBatch, Parts, Result, StoreError};
+use store::{FinalBatch, Result, StoreError};
 use tokio::{
     sync::mpsc,
     time::{Instant, sleep_until},
@@ -18,32 +17,14 @@ use tracing::warn;
 
 use super::{
     backoff::Backoff,
+    batch::Batch,
     phases::Phases,
     running::{Running, StopReason},
     state::Queue,
 };
 
-/// The most events in a batch.
-const MOST_EVENTS: usize = 50;
-/// The most members of a sweep in a batch.
-const MOST_MEMBERS: usize = 200;
 /// The longest time from the first event of a batch until it is stored.
 const LATENCY: Duration = Duration::from_millis(50);
-
-/// Reports of a solver that are stored together. The solver sends each report as a batch of its own, and the recorder
-/// combines these batches.
-#[derive(Debug, Default)]
-pub(super) struct Batch {
-    pub(super) events: Vec<(Time, Payload)>,
-    /// The results of members of a sweep.
-    pub(super) members: Vec<(Time, MemberRow)>,
-    /// A partial result that the solver has reported after the events.
-    pub(super) partial: Option<Arc<Parts>>,
-    /// Whether the problem has one load level on one grid, so that the job ends with its iterations.
-    pub(super) one_level: bool,
-    /// Whether the solver has ended, so that this is the last batch.
-    pub(super) last: bool,
-}
 
 /// Stores the reports of the solver until the solver ends, and returns its last events: these are stored together with
 /// the end of the job, in one commit. A failed write is retried while the solver waits, since the disk may be full
@@ -88,6 +69,7 @@ pub(super) async fn record(
         if !store_with_retries(queue, job, running, &batch, &progress).await {
             break;
         }
+        running.stored.fetch_add(batch.reports, Relaxed);
     }
     running.stop(StopReason::Unwanted);
     while reports.recv().await.is_some() {} // the solver must not block on a full channel
@@ -178,22 +160,6 @@ async fn next_batch(reports: &mut mpsc::Receiver<Batch>) -> Batch {
         }
     }
     batch
-}
-
-impl Batch {
-    fn add(&mut self, more: Batch) {
-        self.events.extend(more.events);
-        self.members.extend(more.members);
-        self.partial = more.partial.or(self.partial.take());
-        self.one_level |= more.one_level;
-    }
-
-    fn is_open(&self) -> bool {
-        self.events.len() < MOST_EVENTS
-            && self.members.len() < MOST_MEMBERS
-            && self.partial.is_none()
-            && !self.last
-    }
 }
 
 /// Updates the progress of a job by one more event.

@@ -1,8 +1,8 @@
 //! The handle on a running solver.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, OnceLock, atomic::AtomicU64};
 
-use base::job::JobId;
+use base::job::{Job, JobId};
 
 /// The handle on a running solver.
 #[derive(Clone, Debug)]
@@ -13,9 +13,24 @@ pub(super) struct Running {
     pub(super) attempt: i32,
     /// Set to ask the solver to stop; the solver checks it in every iteration.
     pub(super) stop: Arc<OnceLock<StopReason>>,
+    /// The number of reports of the solver that are stored.
+    pub(super) stored: Arc<AtomicU64>,
+    /// Whether the solver runs on this machine.
+    pub(super) here: bool,
 }
 
 impl Running {
+    /// The handle on the solver of an attempt that begins.
+    pub(super) fn begin(job: &Job, here: bool) -> Running {
+        Running {
+            id: job.id,
+            attempt: job.attempt,
+            stop: Arc::default(),
+            stored: Arc::default(),
+            here,
+        }
+    }
+
     /// Asks the solver to stop for this reason. If it was asked before, the first reason is kept.
     pub(super) fn stop(&self, reason: StopReason) {
         let _ = self.stop.set(reason); // fails if a reason is set already, which is kept

@@ -32,11 +32,11 @@ use super::{
     supervisor::Supervisor,
 };
 
-/// Reads the stored form of a mesh, which was stored when the job was accepted. Call this on a blocking thread.
-pub(super) fn stored_mesh(store: &Arc<Store>, hash: &str) -> Result<Vec<u8>, NoSolution> {
+/// Reads the stored form of a mesh, which was stored when the job was accepted.
+pub(super) async fn stored_mesh(store: &Arc<Store>, hash: &str) -> Result<Vec<u8>, NoSolution> {
     let failed =
         |cause: &dyn std::fmt::Display| NoSolution::Internal(format!("mesh {hash}: {cause}"));
-    let body = tokio::runtime::Handle::current().block_on(store.mesh_body(hash));
+    let body = store.mesh_body(hash).await;
     let body = body.map_err(|error| failed(&error))?;
     body.ok_or_else(|| failed(&"it is not stored"))
 }
@@ -47,11 +47,10 @@ pub(super) fn read_mesh(body: &[u8]) -> Result<Mesh, NoSolution> {
         .map_err(|error| NoSolution::Internal(format!("a stored mesh cannot be read: {error}")))
 }
 
-/// Reads the members of a sweep that belong to the job with this key, and which of them are not solved yet. Call this on a
-/// blocking thread.
-pub(super) fn members_of(store: &Arc<Store>, key: i64) -> Result<MembersTask, NoSolution> {
+/// Reads the members of a sweep that belong to the job with this key, and which of them are not solved yet.
+pub(super) async fn members_of(store: &Arc<Store>, key: i64) -> Result<MembersTask, NoSolution> {
     let failed = |cause: String| NoSolution::Internal(format!("the members of the job: {cause}"));
-    let task = tokio::runtime::Handle::current().block_on(store.members_task(key));
+    let task = store.members_task(key).await;
     let task = task.map_err(|error| failed(error.to_string()))?;
     task.ok_or_else(|| failed("they are not stored".into()))
 }

@@ -12,6 +12,7 @@ use tokio::sync::{Notify, OwnedSemaphorePermit, RwLock, Semaphore, SemaphorePerm
 use tokio_util::sync::CancellationToken;
 
 use super::{
+    leases::Leases,
     load::{LastHour, LoadPoint},
     process::Processes,
     running::Running,
@@ -57,6 +58,8 @@ pub struct Queue {
     origins: Mutex<BTreeMap<i64, Trace>>,
     /// The load of the last hour.
     pub(super) last_hour: LastHour,
+    /// The workers elsewhere, and the jobs that they solve.
+    pub(super) leases: Leases,
     /// The token that is canceled when the service is about to stop.
     pub(super) stopping: CancellationToken,
 }
@@ -84,8 +87,8 @@ pub struct State {
     pub queued: usize,
     /// The number of jobs that workers are solving.
     pub running: usize,
-    /// The number of workers.
-    pub workers: u16,
+    /// The number of jobs that can be solved at the same time: the workers here, and the slots of those elsewhere.
+    pub workers: u32,
     /// The number of idle workers. A worker whose job was ended by force stays busy until its solver returns.
     pub idle: usize,
 }
@@ -106,6 +109,7 @@ impl Queue {
             claiming: RwLock::default(),
             origins: Mutex::default(),
             last_hour: LastHour::default(),
+            leases: Leases::default(),
             stopping: CancellationToken::new(),
         })
     }
@@ -148,12 +152,13 @@ impl Queue {
 
     /// The state of the queue.
     pub fn state(&self) -> State {
+        let slots = self.leases.slots();
         State {
             paused: self.store.is_paused(),
             queued: self.store.waiting(),
             running: self.running().len(),
-            workers: self.workers,
-            idle: self.slots.available_permits(),
+            workers: u32::from(self.workers) + slots as u32,
+            idle: self.slots.available_permits() + slots.saturating_sub(self.leases.count()),
         }
     }
 
@@ -232,7 +237,8 @@ impl Queue {
     /// these processors.
     pub(super) fn has_spare_processor(&self) -> bool {
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
-        2 * self.running().len() <= processors
+        let running = self.running();
+        2 * running.values().filter(|running| running.here).count() <= processors
     }
 
     /// Jobs that a worker of this process is solving, by key.

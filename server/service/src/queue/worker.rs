@@ -6,19 +6,26 @@ use base::{
     event::Payload,
     failpoint::{self, Point},
     job::{Job, JobId, Status},
+    memory::Reservation,
     sweep::MemberRow,
     time::Time,
 };
 use store::{Claim, Ending, FinalBatch, Parts, StoreError};
-use tokio::sync::mpsc;
+use tokio::{
+    runtime::Handle,
+    sync::{Mutex as AsyncMutex, mpsc},
+};
 use tokio_util::task::AbortOnDropHandle;
 use tracing::{error, info, warn};
 
 use super::{
     backoff::Backoff,
-    ending::{NoSolution, ending_of_attempt, internal, panicked, timed_out},
+    batch::Batch,
+    elsewhere::InForce,
+    ending::{NoSolution, Solved, ending_of_attempt, internal, panicked, timed_out},
+    leases::Offer,
     process::Task,
-    recorder::{self, Batch},
+    recorder,
     running::{Running, StopReason},
     solving::{members_of, read_mesh, solve_task, stored_mesh},
     state::{Queue, Slot, Solver},
@@ -31,15 +38,18 @@ const MOST_UNRECORDED: usize = 256;
 /// How long the solver of a job that has reached its time limit may take to return its last state (see `Limits`).
 const TIMEOUT_GRACE: Duration = Duration::from_secs(2);
 
+/// Where a job is solved.
+pub(super) enum Seat {
+    /// In a slot of this service.
+    Here(Arc<Slot>),
+    /// At the worker elsewhere whose offer was taken.
+    Elsewhere(Offer),
+}
+
 /// Makes one attempt to solve a job, from the claim to the end. A panic costs this job alone.
-pub(super) async fn run_attempt(
-    queue: &Arc<Queue>,
-    claim: Claim,
-    running: Running,
-    slot: Arc<Slot>,
-) {
+pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Running, seat: Seat) {
     let job = claim.job.clone();
-    let attempt = try_attempt(queue.clone(), claim, running.clone(), slot.clone());
+    let attempt = try_attempt(queue.clone(), claim, running.clone(), seat);
     let attempt = tokio::spawn(attempt);
     if let Err(panic) = attempt.await
         && let Ok(panic) = panic.try_into_panic()
@@ -52,59 +62,48 @@ pub(super) async fn run_attempt(
     queue.release(&job);
 }
 
-async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Arc<Slot>) {
+async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, seat: Seat) {
     let Claim {
         job,
         problem,
         mesh,
         memory,
     } = claim;
-    info!(job.id = %job.id, job.attempt, "job {} started", job.id);
+    match &seat {
+        Seat::Here(_) => info!(job.id = %job.id, job.attempt, "job {} started", job.id),
+        Seat::Elsewhere(Offer { worker, name, .. }) => {
+            info!(job.id = %job.id, job.attempt, %worker, "job {} started at {worker} on {name}", job.id);
+        }
+    }
     let (queue, id) = (&queue, job.id);
     failpoint::pass(Point::Begun, id);
     let (sender, reports) = mpsc::channel(MOST_UNRECORDED);
-    let mut worker = Worker {
-        queue: queue.clone(),
-        id,
-        running: running.clone(),
-        recorder: sender,
+    // until the end of the attempt is stored: then the worker elsewhere is told so
+    let mut in_force = None;
+    let solving = match seat {
+        Seat::Here(slot) => {
+            let worker = Worker {
+                queue: queue.clone(),
+                id,
+                running: running.clone(),
+                recorder: sender,
+            };
+            let (key, in_sweep) = (job.key, job.sweep.is_some());
+            let task = (problem, mesh, in_sweep.then_some(key));
+            tokio::task::spawn_blocking(move || {
+                // given back when the solver has returned, or panicked, in this order: another job may have them then
+                let _slot = slot;
+                let memory = memory;
+                solve_here(task, memory, worker)
+            })
+        }
+        Seat::Elsewhere(offer) => {
+            let lease = InForce::new(queue, offer, &job, &running);
+            let lease = Arc::new(AsyncMutex::new(lease));
+            in_force = Some(lease.clone());
+            tokio::spawn(async move { lease.lock().await.solve(problem, sender).await })
+        }
     };
-    let (key, in_sweep) = (job.key, job.sweep.is_some());
-    let solving = tokio::task::spawn_blocking(move || {
-        // given back when the solver has returned, or panicked, in this order: another job may have them then
-        let _slot = slot;
-        let mut memory = memory;
-        memory.free_dropped();
-        let queue = worker.queue.clone();
-        let Queue { store, solver, .. } = &*queue;
-        let mesh = mesh.map(|hash| stored_mesh(store, &hash)).transpose()?;
-        let members = if in_sweep {
-            Some(members_of(store, key)?)
-        } else {
-            None
-        };
-        if failpoint::fails(Point::MeshRead, id) {
-            return Err(NoSolution::Internal("a test wants it".into()));
-        }
-        match solver {
-            Solver::Threads(solve) => {
-                let mesh = mesh.as_deref().map(read_mesh).transpose()?;
-                let allowance = memory.allowance();
-                let members = members.as_ref();
-                solve_task(&problem, mesh, members, *solve, allowance, &mut worker)
-            }
-            Solver::Processes(processes) => {
-                let task = Task {
-                    problem,
-                    members,
-                    mesh,
-                    share: memory.share(),
-                    threads: worker.threads(),
-                };
-                processes.solve(task, &mut worker)
-            }
-        }
-    });
     let timer = tokio::spawn(time_out(queue.clone(), job.clone(), running.clone()));
     let timer = AbortOnDropHandle::new(timer);
     let (last, phases) = recorder::record(queue, &job, &running, reports).await;
@@ -119,7 +118,10 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
     let origin = queue.origin(job.key);
     if let Err(NoSolution::Lost(how)) = &solved {
         phases.tell_spans(&job, origin.as_ref(), None);
-        requeue_with_retries(queue, &job, how).await;
+        requeue_with_retries(queue, &job, Some(how)).await;
+    } else if let Err(NoSolution::GivenBack) = &solved {
+        phases.tell_spans(&job, origin.as_ref(), None);
+        requeue_with_retries(queue, &job, None).await;
     } else {
         let (ending, parts) = ending_of_attempt(&job, solved, running.stop.get().copied());
         // when the service stops, it is requeued then or at the next start, and not canceled
@@ -130,7 +132,46 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
             end_with_retries(queue, &job, ending, last, parts).await;
         }
     }
+    drop(in_force);
     failpoint::pass(Point::Done, id);
+}
+
+/// Solves a claimed job on this thread, or in a process that it feeds: the problem, the hash of its mesh, and the key of a
+/// job whose members are to be solved.
+fn solve_here(
+    (problem, mesh, members): (String, Option<String>, Option<i64>),
+    memory: Option<Reservation>,
+    mut worker: Worker,
+) -> Result<Solved, NoSolution> {
+    let mut memory = memory.ok_or_else(|| NoSolution::Internal("no memory is reserved".into()))?;
+    memory.free_dropped();
+    let queue = worker.queue.clone();
+    let (Queue { store, solver, .. }, now) = (&*queue, Handle::current());
+    let mesh = mesh.map(|hash| now.block_on(stored_mesh(store, &hash)));
+    let mesh = mesh.transpose()?;
+    let members = members.map(|key| now.block_on(members_of(store, key)));
+    let members = members.transpose()?;
+    if failpoint::fails(Point::MeshRead, worker.id) {
+        return Err(NoSolution::Internal("a test wants it".into()));
+    }
+    match solver {
+        Solver::Threads(solve) => {
+            let mesh = mesh.as_deref().map(read_mesh).transpose()?;
+            let allowance = memory.allowance();
+            let members = members.as_ref();
+            solve_task(&problem, mesh, members, *solve, allowance, &mut worker)
+        }
+        Solver::Processes(processes) => {
+            let task = Task {
+                problem,
+                members,
+                mesh,
+                share: memory.share(),
+                threads: worker.threads(),
+            };
+            processes.solve(task, &mut worker)
+        }
+    }
 }
 
 /// The worker of a job as the supervisor of its solver, on a blocking thread.
@@ -183,13 +224,30 @@ impl Supervisor for Worker {
     }
 }
 
-/// Requeues a job whose process died, or ends it if that was its last attempt; retried until it succeeds or is useless.
-async fn requeue_with_retries(queue: &Queue, job: &Job, how: &str) {
-    warn!(job.id = %job.id, job.attempt, "the process that solved {} died: {how}", job.id);
+/// Requeues a job whose worker was lost, for the reason `how`, or ends it if that was its last attempt; or requeues a job
+/// that its worker has given back. This is retried until it succeeds or is useless.
+async fn requeue_with_retries(queue: &Queue, job: &Job, how: Option<&str>) {
+    let (store, key) = (&queue.store, job.key);
+    match how {
+        Some(how) => {
+            warn!(job.id = %job.id, job.attempt, "the process that solved {} died: {how}", job.id);
+        }
+        None => info!(job.id = %job.id, job.attempt, "job {} was given back by its worker", job.id),
+    }
     let mut backoff = Backoff::default();
     loop {
-        match queue.store.requeue_lost(job.key, job.attempt, how).await {
-            Ok(changed) => return queue.announce(&changed),
+        let requeued = match how {
+            Some(how) => store.requeue_lost(key, job.attempt, how).await,
+            None => {
+                let requeued = store.requeue_drained(key, job.attempt).await;
+                requeued.map(|requeued| requeued.map(|_| key).into_iter().collect())
+            }
+        };
+        match requeued {
+            Ok(changed) => {
+                queue.announce(&changed);
+                return queue.wake.notify_one();
+            }
             Err(cause) if backoff.gives_up(job.id, job.key, &cause) => return,
             Err(cause) => {
                 warn!(job.id = %job.id, %cause, "job {} could not be requeued yet: {cause}", job.id);

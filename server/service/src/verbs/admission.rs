@@ -197,7 +197,7 @@ pub(super) async fn admit(
     caller: &Caller,
     prepared: Prepared,
 ) -> Result<NewJob, ApiError> {
-    let budget_bytes = service.memory_budget_bytes;
+    let budget_bytes = service.largest_job_bytes();
     let stored = match &prepared.problem {
         Ok((problem, _)) => problems::stored(service, caller, problem).await,
         Err(_) => Ok(None),

@@ -196,7 +196,8 @@ pub fn me<'a>(service: &'a Service, caller: &'a Caller) -> BoxFuture<'a, Result<
             .max_queued_of_owner()
             .unwrap_or(service.config.max_queued);
         let workers = service.queue.state().workers;
-        let running_limit = service.config.max_running_per_owner.unwrap_or(workers);
+        let running_limit = service.config.max_running_per_owner;
+        let running_limit = running_limit.map_or(workers, u32::from);
         Ok(Me {
             owner: caller.owner().to_owned(),
             scopes: caller.scopes().collect(),
@@ -268,13 +269,13 @@ pub fn info<'a>(
             name: "signorini".into(),
             version: env!("CARGO_PKG_VERSION").into(),
             api_version: "v1".into(),
-            workers: service.queue.state().workers.into(),
+            workers: service.queue.state().workers,
             isolation: service.config.isolation,
             limits: ServiceLimits {
                 max_body_bytes: service.config.max_body_bytes as u64,
                 max_message_bytes: MAX_MESSAGE_BYTES as u64,
                 max_mesh_bytes: service.config.max_mesh_bytes as u64,
-                memory_budget_bytes: service.memory_budget_bytes,
+                memory_budget_bytes: service.largest_job_bytes(),
                 body_cache_bytes: budget.of_bodies(),
                 max_queued: service.config.max_queued,
                 max_batch: MAX_BATCH as u32,

@@ -40,7 +40,7 @@ pub fn metrics<'a>(
         now.gauge(
             "signorini_workers",
             "Jobs that can run at the same time",
-            state.workers.into(),
+            f64::from(state.workers),
         );
         now.gauge("signorini_workers_idle", "Idle workers", state.idle as f64);
 

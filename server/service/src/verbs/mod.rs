@@ -27,6 +27,7 @@
 //! | tokens | `tokens` |
 //! | the queue | `queue` |
 //! | version, limits and shares | `info` |
+//! | workers elsewhere | `workers` |
 //! | metrics | `metrics` |
 
 // The service, which every operation receives.
@@ -76,6 +77,7 @@ pub mod examples;
 pub mod info;
 pub mod metrics;
 pub mod queue;
+pub mod workers;
 
 pub use service::{MAX_MESSAGE_BYTES, Service};
 

@@ -77,7 +77,7 @@ pub fn validate<'a>(
             Ok(problem) => problem,
             Err(violations) => return Ok(Validation::unread(violations)),
         };
-        let budget_bytes = service.memory_budget_bytes;
+        let budget_bytes = service.largest_job_bytes();
         let stored = match stored(service, caller, &problem).await {
             Err(ApiError::InvalidProblem(violations)) => {
                 return Ok(Validation::unread(violations));

@@ -39,7 +39,7 @@ pub fn state(service: &Service, _caller: &Caller) -> QueueState {
         paused: state.paused,
         queued: state.queued as u64,
         running: state.running as u64,
-        workers: u32::from(state.workers),
+        workers: state.workers,
         idle: state.idle as u32,
         max_queued: service.config.max_queued,
     }

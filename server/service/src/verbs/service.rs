@@ -39,9 +39,6 @@ pub struct Service {
     checks: Arc<Semaphore>,
     /// Limits how many jobs each owner submits.
     rates: Rates,
-    /// The memory that one job may need according to its estimate (bytes): the memory budget of the settings, or its
-    /// default.
-    pub(super) memory_budget_bytes: u64,
     /// The limit on bytes of request bodies in memory, over all requests.
     pub received: Limit,
     /// The limit on bytes of answers in memory, over all requests.
@@ -101,7 +98,6 @@ impl Service {
             queue,
             checks: Arc::new(Semaphore::new(2)),
             rates: Rates::new(config.max_submissions_per_owner_per_minute),
-            memory_budget_bytes: config.memory.bytes(),
             received: Limit::new(config.max_received_bytes),
             sent: Limit::new(config.max_sent_bytes),
             fields_in_memory: FieldsInMemory::default(),
@@ -109,6 +105,13 @@ impl Service {
             run: Uuid::now_v7().simple().to_string(),
             config,
         }
+    }
+
+    /// The memory that one job may need according to its estimate (bytes): the memory budget, or the memory of the largest
+    /// worker elsewhere.
+    pub(super) fn largest_job_bytes(&self) -> u64 {
+        let budget = self.config.memory.bytes();
+        budget.max(self.store.budget().elsewhere())
     }
 
     /// How many jobs of one owner may wait; `None`: no separate limit, because a service without authentication has

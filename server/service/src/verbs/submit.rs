@@ -82,7 +82,7 @@ async fn admit_new(
         Checked(Box<NewJob>),
         OnStoredMesh(Box<Prepared>),
     }
-    let budget_bytes = service.memory_budget_bytes;
+    let budget_bytes = service.largest_job_bytes();
     let max_timeout_s = service.config.max_timeout_s;
     let read = move || {
         let prepared = Prepared::new(request()?, None, max_timeout_s)?;

@@ -241,7 +241,7 @@ async fn admitted(
             .map(|info| info.size()),
         None => None,
     };
-    let (budget_bytes, max_timeout_s) = (service.memory_budget_bytes, service.config.max_timeout_s);
+    let (budget_bytes, max_timeout_s) = (service.largest_job_bytes(), service.config.max_timeout_s);
     let Envelope {
         name,
         labels,

@@ -49,6 +49,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
         trust: ProxyTrust::default(),
         allow_unauthenticated: false,
         workers: 1,
+        lease_s: 30,
         isolation: Isolation::Thread,
         max_queued: 10,
         max_queued_per_owner: 10,

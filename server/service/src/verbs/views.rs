@@ -154,7 +154,7 @@ pub fn of_problem<'a>(
     Box::pin(async move {
         let problem = problem.map_err(ApiError::InvalidProblem)?;
         let stored = problems::stored(service, caller, &problem).await?;
-        let budget_bytes = service.memory_budget_bytes;
+        let budget_bytes = service.largest_job_bytes();
         let draw = move || {
             let stored = problems::first_mesh_within(&problem, stored, budget_bytes)?;
             view::geometry(&problem, stored.as_ref(), None, &BTreeMap::new()).map_err(|reason| {

@@ -265,7 +265,7 @@ class QueueView {
         });
       }}>
         <label>Name, for people <input name="name" required maxlength="64" /></label><label>Owner, whose jobs it sees <input name="owner" required pattern="[A-Za-z0-9._@+\\-]+" maxlength="64" title="letters, digits and . _ @ + -" /></label>
-        <fieldset><legend>May</legend>${["read", "submit", "cancel", "admin"].map((scope) => html`<label><input type="checkbox" name="scope" value=${scope} ?checked=${scope !== "admin"} /> ${scope}</label> `)}</fieldset>
+        <fieldset><legend>May</legend>${["read", "submit", "cancel", "work", "admin"].map((scope) => html`<label><input type="checkbox" name="scope" value=${scope} ?checked=${scope !== "work" && scope !== "admin"} /> ${scope}</label> `)}</fieldset>
         <label>Days <input name="days" type="number" min="1" placeholder="no end" /></label><button>Make a token</button></form></section>`;
   }
 }

@@ -26,6 +26,7 @@ use service::{
 use super::{
     operations, page,
     reply::{is_grpc, refusal},
+    request_target::WORKER_SERVICE,
     revocation::end_when_revoked,
     session,
 };
@@ -120,6 +121,9 @@ fn access(request: &Request) -> Access {
     let path = request.uri().path();
     if let Some(rpc) = path.strip_prefix("/signorini.v1.JobService/") {
         return RPCS.get(rpc).copied().unwrap_or(Access::Identified);
+    }
+    if path.starts_with(WORKER_SERVICE) {
+        return Access::Needs(Scope::Work);
     }
     if path.starts_with("/grpc.reflection.") {
         return operations::DESCRIPTION;

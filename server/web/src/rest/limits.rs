@@ -74,7 +74,7 @@ pub(super) async fn limits(
 
 /// Whether a path belongs to one of the gRPC services.
 fn is_of_grpc(path: &str) -> bool {
-    ["/signorini.v1.", "/grpc."]
+    ["/signorini.", "/grpc."]
         .iter()
         .any(|start| path.starts_with(start))
 }

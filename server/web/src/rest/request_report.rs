@@ -34,7 +34,7 @@ use tracing::{Level, debug, enabled, info};
 
 use super::{
     forwarded,
-    request_target::is_probe,
+    request_target::is_routine,
     request_target::{RequestTarget, UNKNOWN, name_of},
 };
 
@@ -97,7 +97,8 @@ impl Budget {
 #[derive(Debug)]
 struct Observed {
     target: RequestTarget,
-    probe: bool,
+    /// Whether the log tells it only if it fails.
+    routine: bool,
     trace: Trace,
     id: String,
     /// The address of the client, as far as it is known.
@@ -117,7 +118,7 @@ impl Observed {
         let trace = Trace::of_request(request.headers());
         Observed {
             target: RequestTarget::of(request),
-            probe: is_probe(request.uri().path()),
+            routine: is_routine(request.uri().path()),
             id: given_id(request.headers()).unwrap_or_else(|| trace.id().to_string()),
             client: forwarded::client(request, trust),
             trace,
@@ -165,7 +166,7 @@ impl Observed {
                 METRICS.answered(method, UNKNOWN, self.status.unwrap_or(0), took);
             }
         }
-        let wanted = if self.probe {
+        let wanted = if self.routine {
             enabled!(target: TARGET, Level::DEBUG)
         } else {
             enabled!(target: TARGET, Level::INFO)
@@ -174,7 +175,7 @@ impl Observed {
         if wanted && !(stranger && BUDGET.is_used_up(self.start)) {
             self.log(took.as_secs_f64(), code);
         }
-        if spans::are_wanted() && !self.probe {
+        if spans::are_wanted() && !self.routine {
             self.span(code).tell();
         }
     }
@@ -187,7 +188,7 @@ impl Observed {
         let client = self.client.map(tracing::field::display);
         macro_rules! tell {
             ($($fields:tt)*) => {
-                if self.probe {
+                if self.routine {
 debug!(target: TARGET, $($fields)*)
 } else {
 info!(target: TARGET, $($fields)*)

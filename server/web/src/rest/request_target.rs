@@ -14,6 +14,11 @@ use super::{operations, page, reply::is_grpc};
 /// The label of a target that is neither a route nor an rpc.
 pub(super) const UNKNOWN: &str = "unknown";
 
+/// The path of the gRPC service for workers elsewhere, before the names of its rpcs.
+pub(super) const WORKER_SERVICE: &str = "/signorini.worker.v1.WorkerService/";
+/// The rpcs of that service.
+const WORKER_RPCS: [&str; 3] = ["Lease", "Report", "GetContent"];
+
 /// The target of a request, as a label with few values.
 #[derive(Clone, Debug)]
 pub(super) enum RequestTarget {
@@ -33,6 +38,7 @@ impl RequestTarget {
             let all = operations::all().into_iter();
             let ours = all.flat_map(|operation| operation.rpcs.iter());
             let ours = ours.map(|rpc| format!("/signorini.v1.JobService/{rpc}"));
+            let ours = ours.chain(WORKER_RPCS.map(|rpc| format!("{WORKER_SERVICE}{rpc}")));
             let others = [
                 "/grpc.health.v1.Health/Check",
                 "/grpc.health.v1.Health/List",
@@ -96,6 +102,11 @@ pub(super) fn name_of(code: Code) -> &'static str {
         Code::DataLoss => "DATA_LOSS",
         Code::Unauthenticated => "UNAUTHENTICATED",
     }
+}
+
+/// Whether a request is one of those that programs send all the time, which the log does not tell.
+pub(super) fn is_routine(path: &str) -> bool {
+    is_probe(path) || path.starts_with(WORKER_SERVICE)
 }
 
 /// Whether a request is for one of the probes or for metrics, which are answered even if all connections are busy.

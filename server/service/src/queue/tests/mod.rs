@@ -6,6 +6,7 @@ mod bodies;
 mod coalescing;
 mod estimates;
 mod failpoints;
+mod leases;
 mod memory;
 mod order;
 mod processes;

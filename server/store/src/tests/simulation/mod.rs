@@ -97,7 +97,7 @@ struct Work {
     canceled: bool,
     /// The result, once some of it may have been written.
     parts: Option<Arc<Parts>>,
-    _memory: Reservation,
+    _memory: Option<Reservation>,
 }
 
 /// Where files are fast.

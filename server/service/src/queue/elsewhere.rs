@@ -1,0 +1,169 @@
+//! Solves jobs at workers elsewhere: what workers ask of the queue, and one leased attempt.
+
+use std::{sync::Arc, time::Duration};
+
+use base::job::{Job, JobId};
+use tokio::sync::mpsc;
+
+use super::{
+    batch::Batch,
+    ending::{NoSolution, Solved},
+    leases::{Ask, Found, Granted, JobAnswer, JobReport, Lease, Offer, Pace, Task, Told, WorkerId},
+    running::Running,
+    solving::{members_of, stored_mesh},
+    state::Queue,
+};
+
+/// The error that there are as many workers as there may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooManyWorkers;
+
+impl Queue {
+    /// Leases a job to a worker, and waits for one for at most this long; `None` if there is none.
+    pub async fn lease(
+        &self,
+        worker: &WorkerId,
+        ask: Ask,
+        wait: Duration,
+    ) -> Result<Option<Arc<Granted>>, TooManyWorkers> {
+        let number = ask.number;
+        let waiting = match self.leases.ask(worker, ask) {
+            Found::Granted(granted) => return Ok(Some(granted)),
+            Found::Nothing => return Ok(None),
+            Found::TooMany => return Err(TooManyWorkers),
+            Found::Waits(waiting) => waiting,
+        };
+        self.store.budget().set_elsewhere(self.leases.largest());
+        let woken = waiting.wake.notified();
+        tokio::pin!(woken);
+        woken.as_mut().enable();
+        if self.leases.granted(worker, number).is_none() {
+            self.wake.notify_one();
+            tokio::select! {
+                () = woken => {}
+                () = tokio::time::sleep(wait) => {}
+                () = self.stopping.cancelled() => {}
+            }
+        }
+        Ok(self.leases.granted(worker, number))
+    }
+
+    /// Takes what a worker reports of one job.
+    pub async fn take_report(
+        &self,
+        worker: &WorkerId,
+        job: JobId,
+        attempt: i32,
+        report: JobReport,
+    ) -> JobAnswer {
+        self.leases.take(worker, (job, attempt), report).await
+    }
+
+    /// The job with its task, if it is the last one that was leased to this worker. `Err`: why it is not.
+    pub fn leased_task(
+        &self,
+        worker: &WorkerId,
+        job: JobId,
+        attempt: i32,
+    ) -> Result<Arc<Granted>, String> {
+        self.leases.lease_of(worker, job, attempt)?;
+        let last = self.leases.last_granted(worker);
+        let this = |granted: &Arc<Granted>| (granted.job, granted.attempt) == (job, attempt);
+        last.filter(this)
+            .ok_or_else(|| format!("{worker} has asked for another job since {job}"))
+    }
+
+    /// The stored form of the mesh of a job that is leased to this worker. `Err`: why there is none.
+    pub async fn leased_mesh(
+        &self,
+        worker: &WorkerId,
+        job: JobId,
+        attempt: i32,
+    ) -> Result<Arc<Vec<u8>>, String> {
+        let lease = self.leases.lease_of(worker, job, attempt)?;
+        let mut kept = lease.mesh.lock().await;
+        if let Some(mesh) = &*kept {
+            return Ok(mesh.clone());
+        }
+        let hash = lease
+            .job
+            .mesh
+            .as_ref()
+            .ok_or("the job has no stored mesh")?;
+        let mesh = stored_mesh(&self.store, hash).await;
+        let mesh = Arc::new(mesh.map_err(|_| format!("mesh {hash} cannot be read"))?);
+        *kept = Some(mesh.clone());
+        Ok(mesh)
+    }
+
+    /// How often workers are to report.
+    pub fn pace(&self) -> Pace {
+        self.leases.pace()
+    }
+
+    /// Sets how long a lease lasts that is not renewed.
+    pub fn set_lease(&self, lasts: Duration) {
+        self.leases.set_lasts(lasts);
+    }
+}
+
+/// A lease that is in force; it ends when this is dropped.
+pub(super) struct InForce {
+    queue: Arc<Queue>,
+    offer: Offer,
+    lease: Arc<Lease>,
+    told: Option<mpsc::Receiver<Told>>,
+}
+
+impl Drop for InForce {
+    fn drop(&mut self) {
+        self.queue.leases.remove(&self.lease);
+        self.lease.end();
+        let Offer { worker, number, .. } = &self.offer;
+        self.queue.leases.give_back(worker, *number);
+        self.queue.wake.notify_one();
+    }
+}
+
+impl InForce {
+    /// Leases a claimed job to the worker whose offer was taken.
+    pub(super) fn new(queue: &Arc<Queue>, offer: Offer, job: &Job, running: &Running) -> InForce {
+        let (worker, name) = (offer.worker.clone(), offer.name.clone());
+        let lasts = queue.leases.lasts();
+        let (lease, told) = Lease::new(job.clone(), worker, name, running.clone(), lasts);
+        queue.leases.enter(&lease);
+        InForce {
+            queue: queue.clone(),
+            offer,
+            lease,
+            told: Some(told),
+        }
+    }
+
+    /// Has the job solved by the worker, until it tells the end of the attempt or is lost.
+    pub(super) async fn solve(
+        &mut self,
+        problem: String,
+        recorder: mpsc::Sender<Batch>,
+    ) -> Result<Solved, NoSolution> {
+        let job = &self.lease.job;
+        let members = match job.sweep {
+            Some(_) => Some(members_of(&self.queue.store, job.key).await?),
+            None => None,
+        };
+        let task = serde_json::to_vec(&Task { problem, members });
+        let granted = Granted {
+            number: self.offer.number,
+            job: job.id,
+            attempt: job.attempt,
+            memory_bytes: job.memory_bytes,
+            mesh: job.mesh.clone(),
+            task: task.map_err(|error| NoSolution::Internal(error.to_string()))?,
+        };
+        self.queue.leases.grant(&self.offer.worker, granted);
+        match self.told.take() {
+            Some(told) => self.lease.attend(told, recorder).await,
+            None => Err(NoSolution::Internal("the job was leased twice".into())),
+        }
+    }
+}

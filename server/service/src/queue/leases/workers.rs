@@ -1,0 +1,319 @@
+//! The workers elsewhere: their offers of slots, and the jobs that are leased to them.
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    sync::Arc,
+    time::Duration,
+};
+
+use base::job::JobId;
+use parking_lot::Mutex;
+use store::Room;
+use tokio::{
+    sync::{Notify, Semaphore},
+    time::Instant,
+};
+
+use super::{
+    lease::{Lease, room_for_results},
+    messages::{About, Ask, Granted, JobAnswer, JobReport, WorkerId},
+};
+
+/// How long a lease lasts from the last report of its worker on, unless the settings say something else.
+const LEASE: Duration = Duration::from_secs(30);
+/// The largest number of workers.
+const MOST_WORKERS: usize = 10_000;
+/// A worker that has not been heard of for as many leases is forgotten.
+const FORGOTTEN_AFTER: u32 = 20;
+/// How many reports that only renew leases all workers together may send in a second.
+const PULSES_PER_S: f64 = 250.0;
+/// The shortest and the longest time between two reports of a worker that has a job: a cancel reaches it with the answer.
+const PULSES: (Duration, Duration) = (Duration::from_millis(100), Duration::from_millis(800));
+
+/// The workers elsewhere, and the jobs that they solve.
+#[derive(Debug)]
+pub(in crate::queue) struct Leases {
+    workers: Mutex<BTreeMap<WorkerId, Known>>,
+    leases: Mutex<HashMap<(JobId, i32), Arc<Lease>>>,
+    /// The memory for results that are arriving.
+    room: Arc<Semaphore>,
+    /// How long a lease lasts.
+    lasts: Mutex<Duration>,
+}
+
+impl Default for Leases {
+    fn default() -> Self {
+        Leases {
+            workers: Mutex::default(),
+            leases: Mutex::default(),
+            room: room_for_results(),
+            lasts: Mutex::new(LEASE),
+        }
+    }
+}
+
+/// How often a worker reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pace {
+    /// The longest time between two reports of a worker that has a job.
+    pub pulse: Duration,
+    /// How long a lease lasts that is not renewed.
+    pub lease: Duration,
+}
+
+/// A worker that has been heard of.
+#[derive(Debug)]
+struct Known {
+    about: About,
+    heard: Instant,
+    /// The number of its last request for a job.
+    number: u64,
+    bid: Bid,
+    /// The memory that it has free (bytes).
+    free_bytes: u64,
+    /// How many of its requests wait; a request that was repeated may wait twice.
+    waiting: u32,
+    /// Wakes the requests that wait.
+    wake: Arc<Notify>,
+}
+
+/// What has become of the last request of a worker.
+#[derive(Debug)]
+enum Bid {
+    /// It is open.
+    Open,
+    /// A job is being claimed for it.
+    Taken,
+    /// It has got a job.
+    Granted(Arc<Granted>),
+}
+
+/// A worker that waits for a job.
+#[derive(Clone, Debug)]
+pub(in crate::queue) struct Offer {
+    pub(in crate::queue) worker: WorkerId,
+    pub(in crate::queue) name: String,
+    pub(in crate::queue) number: u64,
+    pub(in crate::queue) room: Room,
+}
+
+/// A request that waits for a job. When it is dropped, it waits no longer.
+pub(in crate::queue) struct Waiting<'a> {
+    leases: &'a Leases,
+    worker: WorkerId,
+    pub(in crate::queue) wake: Arc<Notify>,
+}
+
+/// What a request for a job finds at once.
+pub(in crate::queue) enum Found<'a> {
+    /// It was answered before.
+    Granted(Arc<Granted>),
+    /// It waits.
+    Waits(Waiting<'a>),
+    /// It does not wait.
+    Nothing,
+    /// There are too many workers.
+    TooMany,
+}
+
+impl Drop for Waiting<'_> {
+    fn drop(&mut self) {
+        if let Some(known) = self.leases.workers.lock().get_mut(&self.worker) {
+            known.waiting = known.waiting.saturating_sub(1);
+        }
+    }
+}
+
+impl Leases {
+    /// Sets how long leases last.
+    pub(in crate::queue) fn set_lasts(&self, lasts: Duration) {
+        *self.lasts.lock() = lasts;
+    }
+
+    /// How long a lease lasts.
+    pub(in crate::queue) fn lasts(&self) -> Duration {
+        *self.lasts.lock()
+    }
+
+    /// How often workers are to report: less often if there are many.
+    pub(in crate::queue) fn pace(&self) -> Pace {
+        let workers = self.workers.lock().len() as f64;
+        let (shortest, longest) = PULSES;
+        let lease = self.lasts();
+        let longest = longest.min(lease / 4);
+        Pace {
+            pulse: Duration::from_secs_f64(workers / PULSES_PER_S)
+                .clamp(shortest.min(longest), longest),
+            lease,
+        }
+    }
+
+    /// The number of jobs that workers elsewhere solve.
+    pub(in crate::queue) fn count(&self) -> usize {
+        self.leases.lock().len()
+    }
+
+    /// The number of slots of the workers that are there.
+    pub(in crate::queue) fn slots(&self) -> usize {
+        let lasts = self.lasts();
+        let workers = self.workers.lock();
+        let there = workers
+            .values()
+            .filter(|known| known.heard.elapsed() <= lasts);
+        there.map(|known| known.about.slots as usize).sum()
+    }
+
+    /// The memory of the largest worker (bytes); 0 without one.
+    pub(in crate::queue) fn largest(&self) -> u64 {
+        let workers = self.workers.lock();
+        let memory = workers.values().map(|known| known.about.memory_bytes);
+        memory.max().unwrap_or(0)
+    }
+
+    /// Notes a request for a job.
+    pub(in crate::queue) fn ask(&self, worker: &WorkerId, ask: Ask) -> Found<'_> {
+        let forgotten = self.lasts() * FORGOTTEN_AFTER;
+        let mut workers = self.workers.lock();
+        if !workers.contains_key(worker) {
+            workers.retain(|_, known| known.heard.elapsed() <= forgotten || known.waiting > 0);
+            if workers.len() >= MOST_WORKERS {
+                return Found::TooMany;
+            }
+        }
+        let known = workers.entry(worker.clone()).or_insert_with(|| Known {
+            about: ask.about.clone(),
+            heard: Instant::now(),
+            number: ask.number,
+            bid: Bid::Open,
+            free_bytes: 0,
+            waiting: 0,
+            wake: Arc::default(),
+        });
+        known.heard = Instant::now();
+        known.about = ask.about;
+        if known.number != ask.number {
+            (known.number, known.bid) = (ask.number, Bid::Open);
+        }
+        if let Bid::Granted(granted) = &known.bid {
+            return Found::Granted(granted.clone());
+        }
+        if !ask.takes && matches!(known.bid, Bid::Open) {
+            return Found::Nothing;
+        }
+        known.free_bytes = ask.free_bytes.min(known.about.memory_bytes);
+        known.waiting += 1;
+        Found::Waits(Waiting {
+            leases: self,
+            worker: worker.clone(),
+            wake: known.wake.clone(),
+        })
+    }
+
+    /// The job that the last request of a worker has got.
+    pub(in crate::queue) fn last_granted(&self, worker: &WorkerId) -> Option<Arc<Granted>> {
+        match &self.workers.lock().get(worker)?.bid {
+            Bid::Granted(granted) => Some(granted.clone()),
+            Bid::Open | Bid::Taken => None,
+        }
+    }
+
+    /// The job that a request with this number has got.
+    pub(in crate::queue) fn granted(&self, worker: &WorkerId, number: u64) -> Option<Arc<Granted>> {
+        let last = self.last_granted(worker);
+        last.filter(|granted| granted.number == number)
+    }
+
+    /// Takes the offers of at most `most` workers that wait for a job. Each must be granted a job, or given back.
+    pub(in crate::queue) fn take_offers(&self, most: usize) -> Vec<Offer> {
+        let mut workers = self.workers.lock();
+        let waiting = workers
+            .iter_mut()
+            .filter(|(_, known)| known.waiting > 0 && matches!(known.bid, Bid::Open));
+        let take = |(worker, known): (&WorkerId, &mut Known)| {
+            known.bid = Bid::Taken;
+            Offer {
+                worker: worker.clone(),
+                name: known.about.name.clone(),
+                number: known.number,
+                room: Room {
+                    whole: known.about.memory_bytes,
+                    free: known.free_bytes,
+                },
+            }
+        };
+        waiting.take(most).map(take).collect()
+    }
+
+    /// Gives back an offer that was taken, unless it was granted a job.
+    pub(in crate::queue) fn give_back(&self, worker: &WorkerId, number: u64) {
+        if let Some(known) = self.workers.lock().get_mut(worker)
+            && known.number == number
+            && matches!(known.bid, Bid::Taken)
+        {
+            known.bid = Bid::Open;
+        }
+    }
+
+    /// Grants a job to a worker whose offer was taken.
+    pub(in crate::queue) fn grant(&self, worker: &WorkerId, granted: Granted) {
+        if let Some(known) = self.workers.lock().get_mut(worker)
+            && known.number == granted.number
+        {
+            known.bid = Bid::Granted(Arc::new(granted));
+            known.wake.notify_waiters();
+        }
+    }
+
+    /// Enters a lease, which is then in force.
+    pub(in crate::queue) fn enter(&self, lease: &Arc<Lease>) {
+        let key = (lease.job.id, lease.job.attempt);
+        self.leases.lock().insert(key, lease.clone());
+    }
+
+    /// Removes a lease that has ended.
+    pub(in crate::queue) fn remove(&self, lease: &Lease) {
+        self.leases
+            .lock()
+            .remove(&(lease.job.id, lease.job.attempt));
+    }
+
+    /// The lease of this job and attempt, if this worker has it. `Err`: why it has none.
+    pub(in crate::queue) fn lease_of(
+        &self,
+        worker: &WorkerId,
+        job: JobId,
+        attempt: i32,
+    ) -> Result<Arc<Lease>, String> {
+        let found = self.leases.lock().get(&(job, attempt)).cloned();
+        match found {
+            Some(lease) if lease.worker == *worker => Ok(lease),
+            Some(lease) => Err(format!(
+                "attempt {attempt} of {job} is leased to {}",
+                lease.worker
+            )),
+            None => Err(format!(
+                "attempt {attempt} of {job} is not leased: it has ended, or its lease has"
+            )),
+        }
+    }
+
+    /// Takes what a worker reports of one job.
+    pub(in crate::queue) async fn take(
+        &self,
+        worker: &WorkerId,
+        (job, attempt): (JobId, i32),
+        report: JobReport,
+    ) -> JobAnswer {
+        if let Some(known) = self.workers.lock().get_mut(worker) {
+            known.heard = Instant::now();
+        }
+        match self.lease_of(worker, job, attempt) {
+            Ok(lease) => lease.take(report, &self.room).await,
+            Err(why) => JobAnswer {
+                over: true,
+                refused: Some(why),
+                ..JobAnswer::default()
+            },
+        }
+    }
+}
