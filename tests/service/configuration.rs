@@ -125,7 +125,7 @@ fn other_commands_find_the_store_and_the_service_of_the_file() {
     assert!(told.contains("did you mean workers?"), "{told}");
     text(&run(
         &["doctor", "--config", &file],
-        &[("SIGNORINI_WORKERS", "0")],
+        &[("SIGNORINI_WORKERS", "257")],
     ));
 }
 
@@ -134,7 +134,7 @@ fn all_invalid_settings_are_reported_together_and_nothing_starts() {
     let folder = tempfile::tempdir().unwrap();
     let settings = "wokers = 3\nmax_queued = \"many\"\n\nisolation = \"proces\"\n";
     let file = write(folder.path(), "wrong.toml", settings);
-    let variables = [("SIGNORINI_WORKERS", "0"), ("SIGNORINI_LOG", "loud")];
+    let variables = [("SIGNORINI_WORKERS", "257"), ("SIGNORINI_LOG", "loud")];
     for command in [&["config", "show"][..], &["serve"][..]] {
         let mut serve = Command::new(SIGNORINI);
         serve
@@ -146,7 +146,7 @@ fn all_invalid_settings_are_reported_together_and_nothing_starts() {
         let told = String::from_utf8(output.stderr).unwrap();
         let lines: Vec<&str> = told.lines().collect();
         let expected = [
-            "signorini: SIGNORINI_WORKERS: found \"0\", expected an integer (0 is not in 1..=256)"
+            "signorini: SIGNORINI_WORKERS: found \"257\", expected an integer (257 is not in 0..=256)"
                 .to_owned(),
             "signorini: SIGNORINI_LOG: found \"loud\", expected a level".to_owned(),
             format!("signorini: {file}:1: \"wokers\" is not a setting; did you mean workers?"),

@@ -148,17 +148,39 @@ async fn a_worker_that_is_to_end_gives_its_job_back() {
 }
 
 #[tokio::test]
-async fn a_worker_outlives_a_restart_of_the_service() {
-    let mut server = Server::start_alone(SIGNORINI, &ELSEWHERE).await;
-    let worker = worker(&server, &["--slots", "1"]);
-    let first = server.submit(&example_json("sheet")).await;
-    server.until_done(&first).await;
-    let address = server.url.trim_start_matches("http://").to_owned();
-    server.kill().await;
-    server.restart_at(&address).await;
-    let second = server.submit(&example_json("sheet")).await;
-    assert_eq!(server.until_done(&second).await["status"], "succeeded");
-    assert!(worker.id().is_some());
+async fn a_job_goes_on_at_its_worker_when_the_service_restarts() {
+    for kill in [true, false] {
+        let mut server = Server::start_alone(SIGNORINI, &ELSEWHERE).await;
+        let _worker = worker(&server, &["--slots", "1"]);
+        let id = server.submit(&large()).await;
+        server.until(&id, |event| event["stage"] == "factor").await;
+        let address = server.url.trim_start_matches("http://").to_owned();
+        if kill {
+            server.kill().await;
+        } else {
+            server.terminate().await;
+        }
+        server.restart_at(&address).await;
+        let job = server.until_done(&id).await;
+        assert_eq!(
+            (&job["status"], &job["attempt"]),
+            (&json!("succeeded"), &json!(1)),
+            "{job:#}\n{}",
+            server.log()
+        );
+        let events = server.events(&id, 0).await.rest().await;
+        let seqs = events.iter().map(|event| event["seq"].as_i64().unwrap());
+        assert!(seqs.eq(1..=events.len() as i64));
+        let stages = events.iter().filter(|event| event["type"] == "stage");
+        let stages: Vec<&Value> = stages.map(|event| &event["stage"]).collect();
+        assert!(
+            !stages.windows(2).any(|two| two[0] == two[1]),
+            "told twice: {stages:?}"
+        );
+        // and it takes more
+        let next = server.submit(&example_json("sheet")).await;
+        assert_eq!(server.until_done(&next).await["status"], "succeeded");
+    }
 }
 
 #[tokio::test]

@@ -220,6 +220,7 @@ impl App {
         };
         let queue = Queue::new(store.clone(), solver, config.workers);
         queue.set_lease(Duration::from_secs(config.lease_s.into()));
+        queue.go_on().await?;
         let service = Arc::new(Service::new(config.clone(), store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;
         let router = rest::router(service, grpc);

@@ -14,27 +14,10 @@ use super::{
     database::Store,
     end,
     error::{Result, StoreError},
+    leases,
     rules::Ending,
-    submission::Claim,
+    submission::{Claim, Place, Room},
 };
-
-/// A place where one job can be solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// A slot of this service, within its memory budget.
-    Here,
-    /// A slot of a worker elsewhere, which says how much memory it has.
-    Away(Room),
-}
-
-/// The memory of a worker elsewhere.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Room {
-    /// The memory that all its jobs together may take (bytes).
-    pub whole: u64,
-    /// The part that is free now (bytes).
-    pub free: u64,
-}
 
 /// Jobs that were claimed in one commit.
 #[derive(Debug, Default)]
@@ -132,6 +115,9 @@ pub(super) fn claim(change: &mut Change<'_>, places: &[Place]) -> Result<Vec<(us
         if failpoint::fails(Point::Claimed, job.id) {
             return Err(StoreError::Full);
         }
+        if let Some(Place::Away(lessee, _)) = places.get(place) {
+            leases::note(change, &job, lessee)?;
+        }
         let claim = Claim {
             mesh: job.mesh.clone(),
             job,
@@ -159,9 +145,9 @@ fn room(
     free: &mut Vec<usize>,
     needed: Option<u64>,
 ) -> Option<(usize, Option<Reservation>)> {
-    let has_room = |place: &usize| match places[*place] {
+    let has_room = |place: &usize| match &places[*place] {
         // a job of unknown need runs alone
-        Place::Away(Room { whole, free }) => needed.unwrap_or(whole) <= free,
+        Place::Away(_, Room { whole, free }) => needed.unwrap_or(*whole) <= *free,
         Place::Here => false,
     };
     if let Some(nth) = free.iter().position(has_room) {
@@ -176,8 +162,8 @@ fn room(
     {
         return Some((free.remove(nth), Some(memory)));
     }
-    let could_later = |place: &usize| match places[*place] {
-        Place::Away(Room { whole, .. }) => needed.is_none_or(|needed| needed <= whole),
+    let could_later = |place: &usize| match &places[*place] {
+        Place::Away(_, Room { whole, .. }) => needed.is_none_or(|needed| needed <= *whole),
         Place::Here => is_here(place),
     };
     free.retain(|place| !could_later(place));

@@ -23,6 +23,7 @@
 //! | the row of a job; how it may change, and what follows | `rows`, `rules`, `change` |
 //! | the end of one job, with all that belongs to it | `end_job` |
 //! | a transaction of the writer and what follows its commit: the log line of a job's end, the jobs whose watchers the caller wakes | `change` |
+//! | which worker elsewhere has a job | `leases` |
 //! | whose turn it is | `turns`, `claim`, `migrations/0019_turns.sql` |
 //! | positions in the queue | `positions` |
 //! | lists of jobs: filters | `filter` |
@@ -119,6 +120,7 @@ mod claim;
 mod coalescing;
 mod end;
 mod end_job;
+mod leases;
 mod requeue;
 
 // Sweeps, which are solved by jobs.
@@ -171,7 +173,7 @@ use self::database::Rebuild;
 pub use self::{
     backup::{Backup, back_up},
     changes::{Changed, Changes, Recent},
-    claim::{Claims, Place, Room},
+    claim::Claims,
     content::{Fingerprint, PIECE_BYTES, PIECES_PER_COMMIT},
     database::Store,
     database::with_advice,
@@ -185,6 +187,7 @@ pub use self::{
     filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy},
     health::Health,
     inspect::{Report, inspect},
+    leases::Leased,
     list::Keys,
     manifest::Manifest,
     meshes::{Removal, StoredMesh},
@@ -197,7 +200,9 @@ pub use self::{
     sizes::OwnerSize,
     snapshot::Snapshot,
     space::{Space, compact_folder},
-    submission::{Accepted, Claim, NewJob, NewSweep, QueueLimits, RequestKey, Submission},
+    submission::{
+        Accepted, Claim, Lessee, NewJob, NewSweep, Place, QueueLimits, RequestKey, Room, Submission,
+    },
     sweeps::{MemberEvents, MembersTask},
     turns::Load,
 };

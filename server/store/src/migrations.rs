@@ -23,7 +23,7 @@ const APPLIED: &str = "create table if not exists _sqlx_migrations (
 )";
 
 /// All steps, each with its version, name and text; a test compares the list with the folder `migrations`.
-const STEPS: [(i64, &str, &str); 21] = [
+const STEPS: [(i64, &str, &str); 22] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -124,6 +124,11 @@ const STEPS: [(i64, &str, &str); 21] = [
         21,
         "run times",
         include_str!("../../../migrations/0021_run_times.sql"),
+    ),
+    (
+        22,
+        "leases",
+        include_str!("../../../migrations/0022_leases.sql"),
     ),
 ];
 

@@ -33,7 +33,7 @@ impl Store {
             .await
     }
 
-    /// Requeues the jobs that were running when the service ended; ends those that were asked to stop, and, if the
+    /// Requeues the jobs that were running here when the service ended; ends those that were asked to stop, and, if the
     /// process died, those whose attempts are used up. Must be called before the listener opens. Returns the number of
     /// these jobs.
     pub async fn requeue_interrupted(self: &Arc<Self>) -> Result<usize> {
@@ -81,7 +81,9 @@ fn requeue_drained(writer: &Writer<'_>, key: i64, attempt: i32) -> Result<Option
 
 fn requeue_interrupted(writer: &Writer<'_>) -> Result<usize> {
     let mut change = writer.control_change()?;
-    let running = "select * from job where status = 'running'";
+    // a job of a worker elsewhere goes on there, unless it was asked to stop
+    let running = "select * from job where status = 'running' and (cancel_requested
+        or not exists (select 1 from lease where lease.job = job.id and lease.attempt = job.attempt))";
     let running = change.sql()?.rows(running, (), |row| Ok(from_row(row)))?;
     if running.is_empty() {
         return Ok(0); // nothing is written: the disk may be full

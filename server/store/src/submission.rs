@@ -121,6 +121,33 @@ pub struct Claim {
     pub memory: Option<Reservation>,
 }
 
+/// A place where one job can be solved.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A slot of this service, within its memory budget.
+    Here,
+    /// A slot of a worker elsewhere, which says how much memory it has.
+    Away(Lessee, Room),
+}
+
+/// A worker elsewhere.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Lessee {
+    /// The name that follows from its secret.
+    pub worker: String,
+    /// Its name for people.
+    pub name: String,
+}
+
+/// The memory of a worker elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// The memory that all its jobs together may take (bytes).
+    pub whole: u64,
+    /// The part that is free now (bytes).
+    pub free: u64,
+}
+
 /// The largest number of submissions that share a commit.
 pub(super) const MOST_PER_COMMIT: usize = 64;
 

@@ -18,15 +18,16 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::{
     change::Change,
-    claim::{self, Place},
-    coalescing,
+    claim, coalescing,
     connections::closed,
     content::{self, Holder, NewContent, name},
     database::{Store, Writer},
     error::{Result, StoreError},
     keys, labels, meshes,
     rows::JobRow,
-    submission::{Accepted, Answer, MOST_PER_COMMIT, NewJob, Pending, QueueLimits, Submission},
+    submission::{
+        Accepted, Answer, MOST_PER_COMMIT, NewJob, Pending, Place, QueueLimits, Submission,
+    },
     sweeps,
 };
 

@@ -65,6 +65,7 @@ impl WorkerService for Workers {
                 mesh: granted.mesh.clone(),
                 task_bytes: granted.task.len() as u64,
                 task: piece(&granted.task, 0),
+                session: granted.session,
             }),
             pulse_s: pace.pulse.as_secs_f64(),
             lease_s: pace.lease.as_secs_f64(),
@@ -83,6 +84,8 @@ impl WorkerService for Workers {
             stop: answer.stop,
             over: answer.over,
             refused: answer.refused,
+            session: answer.session,
+            events: answer.events,
         });
         Ok(Response::new(pb::ReportResponse {
             jobs: answers.collect(),
@@ -124,6 +127,7 @@ fn read(report: pb::JobReport) -> Result<(JobId, i32, JobReport), ApiError> {
         bytes: piece.data,
     });
     let told = JobReport {
+        session: report.session,
         first: report.first,
         reports: report.reports,
         piece,

@@ -79,6 +79,8 @@ pub(super) struct Leased {
     pub(super) task_bytes: u64,
     /// The beginning of the task.
     pub(super) task: Vec<u8>,
+    /// The session that reports are to name.
+    pub(super) session: u64,
 }
 
 impl Calls {
@@ -137,6 +139,7 @@ impl Calls {
             mesh: job.mesh,
             task_bytes: job.task_bytes,
             task: job.task,
+            session: job.session,
         });
         Ok((leased, seconds(answer.pulse_s)))
     }

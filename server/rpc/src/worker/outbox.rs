@@ -53,18 +53,29 @@ pub(super) struct Outbox {
 
 #[derive(Debug, Default)]
 struct State {
-    /// The number of reports that are not kept any more.
+    /// The session that the numbers are about.
+    session: u64,
+    /// The number of reports of the session that are not kept any more.
     dropped: u64,
+    /// The number of events of the attempt among all that are not kept any more.
+    dropped_events: u64,
     /// The others, the oldest first.
-    kept: VecDeque<Vec<u8>>,
+    kept: VecDeque<Kept>,
     /// How many the service has received.
     received: u64,
-    /// Results that the service has not received.
+    /// Results that the service has not received, and the last one, until its job is over.
     uploads: VecDeque<Upload>,
     /// The number of results so far.
     numbered: u64,
     /// How the job has ended.
     end: Option<Vec<u8>>,
+}
+
+/// A report, until the service has stored it.
+#[derive(Debug)]
+struct Kept {
+    json: Vec<u8>,
+    is_event: bool,
 }
 
 #[derive(Debug)]
@@ -80,6 +91,25 @@ impl State {
     /// How many reports are to be sent.
     fn unsent(&self) -> usize {
         (self.dropped + self.kept.len() as u64).saturating_sub(self.received) as usize
+    }
+
+    fn drop_first(&mut self) -> bool {
+        let first = self.kept.pop_front();
+        self.dropped_events += u64::from(first.as_ref().is_some_and(|first| first.is_event));
+        first.is_some()
+    }
+
+    /// Begins a session: `events` of the attempt are stored, and everything after them is to be sent again. False if some of
+    /// that is not kept any more.
+    fn begin_session(&mut self, session: u64, events: u64) -> bool {
+        while self.dropped_events < events && self.drop_first() {}
+        self.session = session;
+        (self.dropped, self.received, self.numbered) = (0, 0, 0);
+        for upload in &mut self.uploads {
+            self.numbered += 1;
+            (upload.number, upload.received) = (self.numbered, 0);
+        }
+        self.dropped_events == events
     }
 
     fn add(&mut self, result: Packed, partial: bool) {
@@ -102,10 +132,13 @@ impl State {
 }
 
 impl Outbox {
-    /// An outbox that notifies `news` when there is something in it.
-    pub(super) fn new(news: Arc<News>) -> Outbox {
+    /// An outbox that notifies `news` when there is something in it, whose reports begin in this session.
+    pub(super) fn new(news: Arc<News>, session: u64) -> Outbox {
         Outbox {
-            state: Mutex::default(),
+            state: Mutex::new(State {
+                session,
+                ..State::default()
+            }),
             room: Condvar::new(),
             news,
             stop: AtomicBool::new(false),
@@ -141,20 +174,23 @@ impl Outbox {
         let state = self.state.lock();
         let sent = state.received.saturating_sub(state.dropped) as usize;
         let mut report = pb::JobReport {
+            session: state.session,
             first: state.received,
             ..pb::JobReport::default()
         };
         for next in state.kept.iter().skip(sent).take(MOST_REPORTS) {
-            if next.len() > *left {
+            if next.json.len() > *left {
                 break;
             }
-            *left -= next.len();
-            report.reports.push(next.clone());
+            *left -= next.json.len();
+            report.reports.push(next.json.clone());
         }
         if report.reports.len() < state.unsent() {
             return report;
         }
-        if let Some(upload) = state.uploads.front() {
+        if let Some(upload) = state.uploads.front()
+            && upload.received < upload.result.total()
+        {
             let data = upload
                 .result
                 .piece(upload.received, (*left).min(LARGEST_PIECE));
@@ -179,16 +215,25 @@ impl Outbox {
     /// Enters the service's answer to a report.
     pub(super) fn answered(&self, answer: &pb::JobAnswer) {
         let mut state = self.state.lock();
+        if answer.session != state.session && !answer.over {
+            if !state.begin_session(answer.session, answer.events) {
+                drop(state);
+                tracing::warn!("the service has lost what it had stored: a job is given back");
+                self.give_back();
+            }
+            self.news.any.notify_one();
+            return;
+        }
         state.received = state.received.max(answer.received);
-        while state.dropped < answer.stored.min(state.received) && state.kept.pop_front().is_some()
-        {
+        while state.dropped < answer.stored.min(state.received) && state.drop_first() {
             state.dropped += 1;
         }
         if let Some(upload) = state.uploads.front_mut()
             && upload.number == answer.upload
         {
             upload.received = answer.upload_bytes;
-            if upload.received >= upload.result.total() {
+            // the last one is kept: a service that restarts has lost it
+            if upload.partial && upload.received >= upload.result.total() {
                 state.uploads.pop_front();
             }
         }
@@ -234,13 +279,16 @@ impl Teller {
     }
 
     fn tell(&self, report: &Report) {
-        // these types are always written
-        let json = serde_json::to_vec(report).unwrap_or_default();
+        let kept = Kept {
+            // these types are always written
+            json: serde_json::to_vec(report).unwrap_or_default(),
+            is_event: matches!(report, Report::Event(_)),
+        };
         let mut state = self.outbox.state.lock();
         while state.unsent() >= MOST_UNSENT && !self.outbox.stop.load(Relaxed) {
             self.outbox.room.wait(&mut state);
         }
-        state.kept.push_back(json);
+        state.kept.push_back(kept);
         drop(state);
         self.outbox.news.any.notify_one();
     }

@@ -177,7 +177,7 @@ impl Worker {
     async fn start(self: &Arc<Self>, leased: Leased, slot: OwnedSemaphorePermit) {
         let (id, attempt) = (leased.id.clone(), leased.attempt);
         info!(job.id = %id, attempt, "job {id} is leased");
-        let outbox = Arc::new(Outbox::new(self.news.clone()));
+        let outbox = Arc::new(Outbox::new(self.news.clone(), leased.session));
         self.jobs
             .lock()
             .insert((id.clone(), attempt), outbox.clone());

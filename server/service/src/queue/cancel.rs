@@ -99,14 +99,15 @@ impl Queue {
         }
     }
 
-    /// Stops taking jobs, and requeues the running ones for the next start of the service, without waiting for their
-    /// solvers.
+    /// Stops taking jobs, and requeues those that run here for the next start of the service, without waiting for their
+    /// solvers. Jobs of workers elsewhere go on.
     pub async fn drain(&self) {
         self.stopping.cancel();
         let _guard = self.claiming.write().await; // no claim is under way
         let running: Vec<(i64, Running)> = self
             .running()
             .iter()
+            .filter(|(_, running)| running.here)
             .map(|(key, running)| (*key, running.clone()))
             .collect();
         for (key, running) in running {

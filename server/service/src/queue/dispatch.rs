@@ -4,13 +4,15 @@ use std::{sync::Arc, time::Duration};
 
 use base::{
     failpoint::{self, Point},
+    job::Job,
     time::Time,
 };
-use store::{Accepted, Claim, Claims, Place, RepeatedError, Result, Submission};
+use store::{Accepted, Claim, Claims, Leased, Place, RepeatedError, Result, Submission};
 use tokio::sync::OwnedSemaphorePermit;
 use tracing::error;
 
 use super::{
+    elsewhere::InForce,
     leases::Offer,
     running::Running,
     state::{Queue, Slot, Solver},
@@ -105,7 +107,7 @@ impl Queue {
             return Ok(false);
         }
         let away = offers.taken.iter().flatten();
-        let away = away.map(|offer| Place::Away(offer.room));
+        let away = away.map(|offer| Place::Away(offer.lessee(), offer.room));
         let here = slots.iter().map(|_| Place::Here);
         let Claims { claims, changed } = self.store.claim_for(away.chain(here).collect()).await?;
         self.announce(&changed);
@@ -114,7 +116,7 @@ impl Queue {
         for (place, claim) in claims {
             // the slots come after the offers, and are all alike
             match offers.taken.get_mut(place).and_then(Option::take) {
-                Some(offer) => self.start_attempt(claim, Seat::Elsewhere(offer)),
+                Some(offer) => self.start_elsewhere(claim.job, offer, Some(claim.problem), 0),
                 None => {
                     if let Some(slot) = slots.pop() {
                         self.start_worker(claim, slot);
@@ -131,16 +133,63 @@ impl Queue {
             permit: Some(slot),
             queue: self.clone(),
         };
-        self.start_attempt(claim, Seat::Here(Arc::new(slot)));
+        let Claim {
+            job,
+            problem,
+            mesh,
+            memory,
+        } = claim;
+        let seat = Seat::Here {
+            slot: Arc::new(slot),
+            problem,
+            mesh,
+            memory,
+        };
+        let running = self.enter(&job, true);
+        self.start_attempt(job, running, seat);
     }
 
-    /// Starts an attempt of a claimed job. Call this while `claiming` is held.
-    fn start_attempt(self: &Arc<Self>, claim: Claim, seat: Seat) {
-        failpoint::pass(Point::Given, claim.job.id);
-        let running = Running::begin(&claim.job, matches!(seat, Seat::Here(_)));
-        self.running().insert(claim.job.key, running.clone());
+    /// Gives a job to a worker elsewhere, or goes on with one that it has had since before the service restarted: then without
+    /// the problem, and with the number of events that are stored. Call this while `claiming` is held, or before the first
+    /// report can come.
+    fn start_elsewhere(
+        self: &Arc<Self>,
+        job: Job,
+        offer: Offer,
+        problem: Option<String>,
+        stored_events: u64,
+    ) {
+        let running = self.enter(&job, false);
+        // in force when this returns: a report may come at once
+        let lease = Box::new(InForce::new(self, offer, &job, &running, stored_events));
+        self.start_attempt(job, running, Seat::Elsewhere { lease, problem });
+    }
+
+    /// Enters a claimed job among those that run.
+    fn enter(&self, job: &Job, here: bool) -> Running {
+        failpoint::pass(Point::Given, job.id);
+        let running = Running::begin(job, here);
+        self.running().insert(job.key, running.clone());
+        running
+    }
+
+    fn start_attempt(self: &Arc<Self>, job: Job, running: Running, seat: Seat) {
         let queue = self.clone();
-        tokio::spawn(async move { worker::run_attempt(&queue, claim, running, seat).await });
+        tokio::spawn(async move { worker::run_attempt(&queue, job, running, seat).await });
+    }
+
+    /// Goes on with the jobs that workers elsewhere solve since before the service restarted: each has the time of a lease to
+    /// report. Call this before the first report can come.
+    pub async fn go_on(self: &Arc<Self>) -> Result<()> {
+        for Leased {
+            job,
+            lessee,
+            events,
+        } in self.store.leased().await?
+        {
+            self.start_elsewhere(job, Offer::of_before(lessee), None, events);
+        }
+        Ok(())
     }
 
     /// Jobs that are running according to the store, but that no worker has: their keys and attempts.

@@ -126,11 +126,17 @@ impl Drop for InForce {
 }
 
 impl InForce {
-    /// Leases a claimed job to the worker whose offer was taken.
-    pub(super) fn new(queue: &Arc<Queue>, offer: Offer, job: &Job, running: &Running) -> InForce {
+    /// Leases a job to a worker, of whose attempt as many events are stored.
+    pub(super) fn new(
+        queue: &Arc<Queue>,
+        offer: Offer,
+        job: &Job,
+        running: &Running,
+        stored_events: u64,
+    ) -> InForce {
         let (worker, name) = (offer.worker.clone(), offer.name.clone());
-        let lasts = queue.leases.lasts();
-        let (lease, told) = Lease::new(job.clone(), worker, name, running.clone(), lasts);
+        let session = (queue.session, stored_events, queue.leases.lasts());
+        let (lease, told) = Lease::new(job.clone(), worker, name, running.clone(), session);
         queue.leases.enter(&lease);
         InForce {
             queue: queue.clone(),
@@ -140,12 +146,32 @@ impl InForce {
         }
     }
 
-    /// Has the job solved by the worker, until it tells the end of the attempt or is lost.
+    /// The offer that was taken.
+    pub(super) fn offer(&self) -> &Offer {
+        &self.offer
+    }
+
+    /// Has the job solved by the worker, until it tells the end of the attempt or is lost. Without a problem: it has the job
+    /// already.
     pub(super) async fn solve(
         &mut self,
-        problem: String,
+        problem: Option<String>,
         recorder: mpsc::Sender<Batch>,
     ) -> Result<Solved, NoSolution> {
+        if let Some(problem) = problem {
+            self.grant(problem).await?;
+        }
+        match self.told.take() {
+            Some(told) => {
+                let stopping = &self.queue.stopping;
+                self.lease.attend(told, recorder, stopping).await
+            }
+            None => Err(NoSolution::Internal("the job was leased twice".into())),
+        }
+    }
+
+    /// Grants the job to the worker that waits for it.
+    async fn grant(&self, problem: String) -> Result<(), NoSolution> {
         let job = &self.lease.job;
         let members = match job.sweep {
             Some(_) => Some(members_of(&self.queue.store, job.key).await?),
@@ -158,12 +184,10 @@ impl InForce {
             attempt: job.attempt,
             memory_bytes: job.memory_bytes,
             mesh: job.mesh.clone(),
+            session: self.queue.session,
             task: task.map_err(|error| NoSolution::Internal(error.to_string()))?,
         };
         self.queue.leases.grant(&self.offer.worker, granted);
-        match self.told.take() {
-            Some(told) => self.lease.attend(told, recorder).await,
-            None => Err(NoSolution::Internal("the job was leased twice".into())),
-        }
+        Ok(())
     }
 }

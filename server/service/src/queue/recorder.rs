@@ -36,7 +36,9 @@ pub(super) async fn record(
     running: &Running,
     mut reports: mpsc::Receiver<Batch>,
 ) -> (FinalBatch, Phases) {
-    let (mut progress, mut one_level) = (Progress::default(), false);
+    // that of a job which goes on elsewhere after a restart of the service
+    let mut progress = job.progress.clone().unwrap_or_default();
+    let mut one_level = false;
     let mut phases = Phases::default();
     loop {
         let batch = next_batch(&mut reports).await;

@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use base::{job::Job, run::Solve, trace::Trace};
+use base::{job::Job, run::Solve, time::Time, trace::Trace};
 use store::{Ending, FinalBatch, Store};
 use tokio::sync::{Notify, OwnedSemaphorePermit, RwLock, Semaphore, SemaphorePermit};
 use tokio_util::sync::CancellationToken;
@@ -60,6 +60,8 @@ pub struct Queue {
     pub(super) last_hour: LastHour,
     /// The workers elsewhere, and the jobs that they solve.
     pub(super) leases: Leases,
+    /// The number of this run of the queue in reports of workers elsewhere.
+    pub(super) session: u64,
     /// The token that is canceled when the service is about to stop.
     pub(super) stopping: CancellationToken,
 }
@@ -110,6 +112,7 @@ impl Queue {
             origins: Mutex::default(),
             last_hour: LastHour::default(),
             leases: Leases::default(),
+            session: Time::now().micros().unsigned_abs(),
             stopping: CancellationToken::new(),
         })
     }

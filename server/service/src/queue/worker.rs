@@ -10,7 +10,7 @@ use base::{
     sweep::MemberRow,
     time::Time,
 };
-use store::{Claim, Ending, FinalBatch, Parts, StoreError};
+use store::{Ending, FinalBatch, Parts, StoreError};
 use tokio::{
     runtime::Handle,
     sync::{Mutex as AsyncMutex, mpsc},
@@ -41,15 +41,29 @@ const TIMEOUT_GRACE: Duration = Duration::from_secs(2);
 /// Where a job is solved.
 pub(super) enum Seat {
     /// In a slot of this service.
-    Here(Arc<Slot>),
-    /// At the worker elsewhere whose offer was taken.
-    Elsewhere(Offer),
+    Here {
+        slot: Arc<Slot>,
+        problem: String,
+        /// The hash of the stored mesh that the problem names.
+        mesh: Option<String>,
+        memory: Option<Reservation>,
+    },
+    /// At a worker elsewhere.
+    Elsewhere {
+        lease: Box<InForce>,
+        /// The problem that the worker is to be given; `None`: it had the job before the service restarted.
+        problem: Option<String>,
+    },
 }
 
 /// Makes one attempt to solve a job, from the claim to the end. A panic costs this job alone.
-pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Running, seat: Seat) {
-    let job = claim.job.clone();
-    let attempt = try_attempt(queue.clone(), claim, running.clone(), seat);
+pub(super) async fn run_attempt(queue: &Arc<Queue>, job: Job, running: Running, seat: Seat) {
+    // the slot is free when the attempt has ended and its solver has returned, whichever is later
+    let _slot = match &seat {
+        Seat::Here { slot, .. } => Some(slot.clone()),
+        Seat::Elsewhere { .. } => None,
+    };
+    let attempt = try_attempt(queue.clone(), job.clone(), running.clone(), seat);
     let attempt = tokio::spawn(attempt);
     if let Err(panic) = attempt.await
         && let Ok(panic) = panic.try_into_panic()
@@ -62,26 +76,20 @@ pub(super) async fn run_attempt(queue: &Arc<Queue>, claim: Claim, running: Runni
     queue.release(&job);
 }
 
-async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, seat: Seat) {
-    let Claim {
-        job,
-        problem,
-        mesh,
-        memory,
-    } = claim;
-    match &seat {
-        Seat::Here(_) => info!(job.id = %job.id, job.attempt, "job {} started", job.id),
-        Seat::Elsewhere(Offer { worker, name, .. }) => {
-            info!(job.id = %job.id, job.attempt, %worker, "job {} started at {worker} on {name}", job.id);
-        }
-    }
+async fn try_attempt(queue: Arc<Queue>, job: Job, running: Running, seat: Seat) {
+    tell_start(&job, &seat);
     let (queue, id) = (&queue, job.id);
     failpoint::pass(Point::Begun, id);
     let (sender, reports) = mpsc::channel(MOST_UNRECORDED);
     // until the end of the attempt is stored: then the worker elsewhere is told so
     let mut in_force = None;
     let solving = match seat {
-        Seat::Here(slot) => {
+        Seat::Here {
+            slot,
+            problem,
+            mesh,
+            memory,
+        } => {
             let worker = Worker {
                 queue: queue.clone(),
                 id,
@@ -97,8 +105,7 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, seat: Se
                 solve_here(task, memory, worker)
             })
         }
-        Seat::Elsewhere(offer) => {
-            let lease = InForce::new(queue, offer, &job, &running);
+        Seat::Elsewhere { lease, problem } => {
             let lease = Arc::new(AsyncMutex::new(lease));
             in_force = Some(lease.clone());
             tokio::spawn(async move { lease.lock().await.solve(problem, sender).await })
@@ -134,6 +141,23 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, seat: Se
     }
     drop(in_force);
     failpoint::pass(Point::Done, id);
+}
+
+/// Logs where an attempt begins, or goes on.
+fn tell_start(job: &Job, seat: &Seat) {
+    let (id, attempt) = (job.id, job.attempt);
+    match seat {
+        Seat::Here { .. } => info!(job.id = %id, job.attempt = attempt, "job {id} started"),
+        Seat::Elsewhere { lease, problem } => {
+            let Offer { worker, name, .. } = lease.offer();
+            let how = if problem.is_some() {
+                "started"
+            } else {
+                "goes on"
+            };
+            info!(job.id = %id, job.attempt = attempt, %worker, "job {id} {how} at {worker} on {name}");
+        }
+    }
 }
 
 /// Solves a claimed job on this thread, or in a process that it feeds: the problem, the hash of its mesh, and the key of a
@@ -261,7 +285,12 @@ async fn requeue_with_retries(queue: &Queue, job: &Job, how: Option<&str>) {
 
 /// Asks the solver of a job to stop at the job's time limit, and ends the job by force if its solver does not stop.
 async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
-    tokio::time::sleep(Duration::from_secs_f64(job.limits.timeout_s)).await;
+    // a job that goes on elsewhere after a restart of the service has run before
+    let ran = job
+        .started_at
+        .map_or(0.0, |start| start.seconds_until(Time::now()));
+    let left = (job.limits.timeout_s - ran.max(0.0)).clamp(0.0, job.limits.timeout_s);
+    tokio::time::sleep(Duration::from_secs_f64(left)).await;
     running.stop(StopReason::OutOfTime);
     tokio::time::sleep(TIMEOUT_GRACE).await;
     // in its own task: a solver that returns now stops this timer, but not a commit that has begun

@@ -61,6 +61,10 @@ pub(in crate::queue) struct Lease {
     name: String,
     running: Running,
     told: mpsc::Sender<Told>,
+    /// The number of the session.
+    number: u64,
+    /// The number of events of the attempt that were stored when the session began.
+    events: u64,
     session: AsyncMutex<Session>,
     /// When the worker last reported something of this job.
     heard: Mutex<Instant>,
@@ -72,7 +76,7 @@ pub(in crate::queue) struct Lease {
     pub(in crate::queue) mesh: AsyncMutex<Option<Arc<Vec<u8>>>>,
 }
 
-/// What has arrived of an attempt.
+/// What has arrived of an attempt in this session.
 #[derive(Debug, Default)]
 struct Session {
     /// The number of reports.
@@ -112,13 +116,14 @@ enum Next {
 }
 
 impl Lease {
-    /// Leases a job to a worker; also returns the channel of what the worker tells.
+    /// Leases a job to a worker, in the session of this number, of whose attempt as many events are stored; also returns the
+    /// channel of what the worker tells.
     pub(in crate::queue) fn new(
         job: Job,
         worker: WorkerId,
         name: String,
         running: Running,
-        lasts: Duration,
+        (number, events, lasts): (u64, u64, Duration),
     ) -> (Arc<Lease>, mpsc::Receiver<Told>) {
         let (told, receiver) = mpsc::channel(MOST_WAITING);
         let lease = Lease {
@@ -127,6 +132,8 @@ impl Lease {
             name,
             running,
             told,
+            number,
+            events,
             session: AsyncMutex::default(),
             heard: Mutex::new(Instant::now()),
             lasts,
@@ -141,16 +148,19 @@ impl Lease {
         self.over.cancel();
     }
 
-    /// Passes on what the worker tells until it tells the end, or the lease is not renewed in time.
+    /// Passes on what the worker tells until it tells the end, or the lease is not renewed in time, or the service stops: the
+    /// next one goes on then.
     pub(in crate::queue) async fn attend(
         &self,
         mut told: mpsc::Receiver<Told>,
         recorder: mpsc::Sender<Batch>,
+        stopping: &CancellationToken,
     ) -> Result<Solved, NoSolution> {
         loop {
             let told = tokio::select! {
                 told = told.recv() => told,
                 () = self.silence() => None,
+                () = stopping.cancelled() => return Err(NoSolution::Stopped),
             };
             match told {
                 // the recorder has ended if the result is not needed; the worker is then told to stop
@@ -181,6 +191,9 @@ impl Lease {
     /// results that are arriving.
     pub(super) async fn take(&self, report: JobReport, room: &Arc<Semaphore>) -> JobAnswer {
         *self.heard.lock() = Instant::now();
+        if report.session != self.number {
+            return self.answer(JobAnswer::default());
+        }
         let mut session = self.session.lock().await;
         let refused = match self.take_all(&mut session, report, room).await {
             Ok(()) => None,
@@ -192,7 +205,7 @@ impl Lease {
                 Some(why)
             }
         };
-        let mut answer = JobAnswer {
+        let answer = JobAnswer {
             received: session.received,
             upload: session.upload.number,
             upload_bytes: session.upload.arrived,
@@ -204,10 +217,19 @@ impl Lease {
         if ended {
             let _ = timeout(UNTIL_STORED, self.over.cancelled()).await; // else it asks again
         }
-        answer.stored = self.running.stored.load(Relaxed);
-        answer.stop = self.running.stop.get().is_some();
-        answer.over = self.over.is_cancelled();
-        answer
+        self.answer(answer)
+    }
+
+    /// Completes an answer.
+    fn answer(&self, answer: JobAnswer) -> JobAnswer {
+        JobAnswer {
+            session: self.number,
+            events: self.events,
+            stored: self.running.stored.load(Relaxed),
+            stop: self.running.stop.get().is_some(),
+            over: self.over.is_cancelled(),
+            ..answer
+        }
     }
 
     async fn take_all(

@@ -18,13 +18,18 @@ impl WorkerId {
     pub fn of(secret: &[u8]) -> WorkerId {
         let hash = Sha256::digest(secret);
         let digits = hash.iter().take(8).map(|byte| format!("{byte:02x}"));
-        WorkerId(digits.collect())
+        WorkerId(format!("worker_{}", digits.collect::<String>()))
+    }
+
+    /// The worker of this name, as it is stored.
+    pub(in crate::queue) fn stored(name: String) -> WorkerId {
+        WorkerId(name)
     }
 }
 
 impl Display for WorkerId {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(f, "worker_{}", self.0)
+        f.write_str(&self.0)
     }
 }
 
@@ -68,6 +73,8 @@ pub struct Granted {
     pub memory_bytes: Option<u64>,
     /// The hash of the stored mesh that the problem names.
     pub mesh: Option<String>,
+    /// The session, which the reports name.
+    pub session: u64,
     /// The task, as JSON of [`Task`](super::Task).
     pub task: Vec<u8>,
 }
@@ -75,7 +82,9 @@ pub struct Granted {
 /// What a worker reports of one job.
 #[derive(Clone, Debug, Default)]
 pub struct JobReport {
-    /// How many reports of this attempt come before these.
+    /// The session that the numbers of the report are about: it changes when the service restarts.
+    pub session: u64,
+    /// How many reports of this session come before these.
     pub first: u64,
     /// What its solver has told, each as JSON of [`Report`].
     pub reports: Vec<Vec<u8>>,
@@ -134,6 +143,11 @@ pub enum End {
 /// The answer to what a worker reports of one job.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct JobAnswer {
+    /// The session. If the report was about another one, nothing of it was used: the worker begins again with what is not
+    /// stored.
+    pub session: u64,
+    /// How many events of the attempt were stored when the session began.
+    pub events: u64,
     /// How many reports have arrived.
     pub received: u64,
     /// How many of them are stored.

@@ -8,7 +8,7 @@ use std::{
 
 use base::job::JobId;
 use parking_lot::Mutex;
-use store::Room;
+use store::{Lessee, Room};
 use tokio::{
     sync::{Notify, Semaphore},
     time::Instant,
@@ -95,6 +95,26 @@ pub(in crate::queue) struct Offer {
     pub(in crate::queue) name: String,
     pub(in crate::queue) number: u64,
     pub(in crate::queue) room: Room,
+}
+
+impl Offer {
+    /// The worker, as it is stored.
+    pub(in crate::queue) fn lessee(&self) -> Lessee {
+        Lessee {
+            worker: self.worker.to_string(),
+            name: self.name.clone(),
+        }
+    }
+
+    /// An offer that was taken before the service restarted.
+    pub(in crate::queue) fn of_before(Lessee { worker, name }: Lessee) -> Offer {
+        Offer {
+            worker: WorkerId::stored(worker),
+            name,
+            number: 0,
+            room: Room { whole: 0, free: 0 },
+        }
+    }
 }
 
 /// A request that waits for a job. When it is dropped, it waits no longer.

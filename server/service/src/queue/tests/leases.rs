@@ -74,9 +74,13 @@ impl Played<'_> {
     }
 
     async fn report(&self, held: &Held, report: JobReport) -> JobAnswer {
-        self.queue
-            .take_report(&self.id, held.id, held.attempt, report)
-            .await
+        let session = self.queue.session;
+        self.report_in(held, JobReport { session, ..report }).await
+    }
+
+    async fn report_in(&self, held: &Held, report: JobReport) -> JobAnswer {
+        let (id, attempt) = (held.id, held.attempt);
+        self.queue.take_report(&self.id, id, attempt, report).await
     }
 
     /// Solves a job, and reports it in pieces of this many bytes.
@@ -471,4 +475,83 @@ async fn a_worker_keeps_its_room_for_the_job_whose_turn_it_is() {
         .await
         .unwrap();
     assert_eq!(next.unwrap().job, small.id);
+}
+
+#[tokio::test]
+async fn a_job_goes_on_at_its_worker_when_the_service_restarts() {
+    for asked_to_stop in [false, true] {
+        let rig = rig_without_slots().await;
+        let mut worker = Played::new(&rig, "one");
+        let job = rig.submit().await;
+        let held = worker.next().await;
+        let (reports, end, result) = solved(&held.task);
+        let some = JobReport {
+            reports: reports[..2].to_vec(),
+            ..JobReport::default()
+        };
+        assert_eq!(worker.report(&held, some).await.received, 2);
+        let two = |event: &Event| event.seq == 4;
+        rig.until(&job, two).await;
+        let before = rig.queue.session;
+        if asked_to_stop {
+            rig.queue.drain().await;
+        }
+        rig.queue.stopping.cancel();
+
+        let again = Queue::new(rig.store.clone(), Solver::Threads(fake::solve), 0);
+        assert_eq!(rig.store.requeue_interrupted().await.unwrap(), 0);
+        again.go_on().await.unwrap();
+        again.start();
+        assert_ne!(again.session, before);
+        worker.queue = &again;
+        let old = JobReport {
+            session: before,
+            first: 2,
+            reports: reports[2..].to_vec(),
+            ..JobReport::default()
+        };
+        let answer = worker.report_in(&held, old).await;
+        assert_eq!(
+            (answer.session, answer.events, answer.received),
+            (again.session, 2, 0)
+        );
+        let rest = JobReport {
+            reports: reports[2..].to_vec(),
+            ..JobReport::default()
+        };
+        let received = worker.report(&held, rest).await.received;
+        assert_eq!(received, reports.len() as u64 - 2);
+        worker
+            .piece(&held, received, &result, 0, usize::MAX >> 1)
+            .await;
+        assert!(worker.end(&held, received, &end).await.over);
+        let done = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
+        assert_eq!((done.status, done.attempt), (Status::Succeeded, 1));
+        let events = rig.store.events_after(job.key, 0, 1000).await.unwrap();
+        assert_eq!(events.len(), reports.len() + 3, "queued, running, done");
+        assert!(rig.store.leased().await.unwrap().is_empty());
+    }
+}
+
+#[tokio::test]
+async fn a_job_whose_worker_does_not_outlive_the_service_is_solved_by_another() {
+    let rig = rig_without_slots().await;
+    let mut worker = Played::new(&rig, "one");
+    let job = rig.submit().await;
+    worker.next().await;
+    rig.queue.stopping.cancel();
+    let again = Queue::new(rig.store.clone(), Solver::Threads(fake::solve), 1);
+    again.set_lease(LEASE);
+    rig.store.requeue_interrupted().await.unwrap();
+    again.go_on().await.unwrap();
+    again.start();
+    let mut subscription = again.subscribe(job.key);
+    loop {
+        let now = rig.store.job(Owners::All, job.id).await.unwrap().unwrap();
+        if now.status.is_terminal() {
+            assert_eq!((now.status, now.attempt), (Status::Succeeded, 2));
+            return;
+        }
+        subscription.changed().await;
+    }
 }
