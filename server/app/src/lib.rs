@@ -1,5 +1,16 @@
 //! The running service: opens the store, requeues the jobs that a crash interrupted, starts the queue, listens,
 //! and stops in reverse order.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | starting and stopping the service | here |
+//! | workers as jobs of Slurm | `slurm` |
+//! | as many of them as the queue needs | `pilots` |
+
+mod pilots;
+pub mod slurm;
 
 use std::{
     env,
@@ -20,7 +31,7 @@ use base::{
 use futures_util::future::BoxFuture;
 use rpc::grpc;
 use service::{
-    config::{Config, Isolation, LogFormat},
+    config::{Config, Isolation, LogFormat, Placement, Placing},
     queue::{self, Processes, Queue, Solver},
     spans::{self, Exporting},
     verbs::Service,
@@ -37,6 +48,8 @@ use web::{
     listener::{self, Listener, Tls},
     rest,
 };
+
+use self::slurm::Pilots;
 
 /// The running service, which listens at its address.
 #[derive(Debug)]
@@ -148,6 +161,41 @@ fn retention(config: &Config) -> Retention {
     }
 }
 
+/// How pilots of Slurm run, and how many there may be; `None` without Slurm.
+fn pilots_of(config: &Config) -> anyhow::Result<Option<(Pilots, u16)>> {
+    let Placement {
+        slurm: Placing::Auto,
+        slurm_server: Some(server),
+        ..
+    } = &config.placement
+    else {
+        return Ok(None);
+    };
+    let settings = &config.placement;
+    let token = match &settings.slurm_token_file {
+        Some(file) => {
+            let text = std::fs::read_to_string(file);
+            Some(text.with_context(|| format!("{} cannot be read", file.display()))?)
+        }
+        None => None,
+    };
+    let pilots = Pilots {
+        server: server.clone(),
+        token: token.map(|token| token.trim().to_owned()),
+        program: match &settings.slurm_program {
+            Some(program) => program.clone(),
+            None => env::current_exe()
+                .context("this program cannot be found; --slurm-program names it")?,
+        },
+        ca: settings.slurm_ca.clone(),
+        slots: settings.slurm_slots,
+        time: Duration::from_secs(settings.slurm_time_s.into()),
+        idle_exit: Duration::from_secs(settings.slurm_idle_exit_s.into()),
+        options: settings.slurm_options.clone(),
+    };
+    Ok(Some((pilots, settings.slurm_pilots)))
+}
+
 /// The error that everybody could use the service from other machines, because it has no authentication.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[error(
@@ -232,6 +280,9 @@ impl App {
         let closing = CancellationToken::new();
         let server = tokio::spawn(listener.serve(router, closing.clone()));
         queue.start();
+        if let Some((pilots, most)) = pilots_of(config)? {
+            tokio::spawn(pilots::keep_going(queue.clone(), pilots, most));
+        }
         tokio::spawn(store::keep_within(
             Arc::downgrade(&store),
             retention(config),

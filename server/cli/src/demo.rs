@@ -10,8 +10,8 @@ use reqwest::Method;
 use rpc::pb::{self, job_service_client::JobServiceClient};
 use serde_json::{Value, json};
 use service::config::{
-    Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, StoreFolder, Telemetry, Tls,
-    WEEK_S, Web,
+    Config, Isolation, MemoryBudget, Placement, ProxyTrust, RetentionLimits, StoreFolder,
+    Telemetry, Tls, WEEK_S, Web,
 };
 use tonic::transport::Channel;
 
@@ -49,6 +49,7 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         max_received_bytes: 64 << 20,
         max_sent_bytes: 128 << 20,
         grace_s: 5,
+        placement: Placement::default(),
         telemetry: Telemetry::default(),
     };
     let app = App::start(&config).await?;

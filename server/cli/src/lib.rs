@@ -4,7 +4,7 @@
 //!
 //! | subject | where |
 //! |---|---|
-//! | commands of the service | `serve`, `worker`, `token`, `backup`, `restore`, `doctor`, `health`, `config` |
+//! | commands of the service | `serve`, `worker`, `slurm`, `token`, `backup`, `restore`, `doctor`, `health`, `config` |
 //! | settings of `serve` and their sources | `settings` |
 //! | commands without a service | `solve`, `sweep`, `convert`, `demo`, `examples`, `explain` |
 //! | tokens for services | `login`, `kept_tokens` |
@@ -43,6 +43,7 @@ mod restore;
 mod serve;
 mod service;
 mod settings;
+mod slurm;
 mod solve;
 mod sweep;
 mod table;
@@ -130,6 +131,9 @@ enum Command {
     /// an invalid option, 1 the service does not accept this worker, or anything else
     #[command(name = WORKER)]
     Worker(worker::Arguments),
+    /// Workers as jobs of Slurm: submit, list and cancel them. Exit code: 0 done, 2 an invalid option, 1 Slurm does not do it, or
+    /// does not answer within ten seconds
+    Slurm(slurm::Arguments),
     /// Start a temporary service, let it solve the five examples over REST and gRPC, and show their verdicts and a figure
     Demo,
 }
@@ -159,32 +163,17 @@ pub fn main() -> ExitCode {
             let (_, given) = settings::innermost(&all, &matches);
             config::run(arguments, given, &lines)
         }
-        Command::Doctor(arguments) => {
-            let _lines = log::start(LevelFilter::WARN);
-            with_runtime(doctor::run(arguments))
-        }
-        Command::Backup(arguments) => {
-            let _lines = log::start(LevelFilter::WARN);
-            with_runtime(backup::run(arguments))
-        }
-        Command::Restore(arguments) => {
-            let _lines = log::start(LevelFilter::WARN);
-            with_runtime(restore::run(arguments))
-        }
-        Command::Health(arguments) => {
-            let _lines = log::start(LevelFilter::WARN);
-            with_runtime(health::run(arguments))
-        }
+        Command::Doctor(arguments) => with_warnings(doctor::run(arguments)),
+        Command::Backup(arguments) => with_warnings(backup::run(arguments)),
+        Command::Restore(arguments) => with_warnings(restore::run(arguments)),
+        Command::Health(arguments) => with_warnings(health::run(arguments)),
         Command::Token(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
             let all = Cli::command();
             let (_, given) = settings::innermost(&all, &matches);
             with_runtime(token::run(arguments, token::names_folder(given)))
         }
-        Command::Login(arguments) => {
-            let _lines = log::start(LevelFilter::WARN);
-            with_runtime(login::login(arguments))
-        }
+        Command::Login(arguments) => with_warnings(login::login(arguments)),
         Command::Logout(arguments) => login::logout(arguments),
         Command::Solve(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
@@ -194,10 +183,7 @@ pub fn main() -> ExitCode {
             let _lines = log::start(LevelFilter::WARN);
             sweep::run(&arguments)
         }
-        Command::Jobs(command) => {
-            let _lines = log::start(LevelFilter::WARN);
-            with_runtime(jobs::run(command))
-        }
+        Command::Jobs(command) => with_warnings(jobs::run(command)),
         Command::Completions(arguments) => pages::completions(&arguments, Cli::command()),
         Command::Man(arguments) => pages::man(&arguments, Cli::command()),
         Command::Schema => solve::schema(),
@@ -216,10 +202,8 @@ pub fn main() -> ExitCode {
             let _lines = log::start_of_worker(arguments.log_level());
             with_runtime(worker::run(arguments))
         }
-        Command::Demo => {
-            let _lines = log::start(LevelFilter::WARN);
-            with_runtime(demo::run())
-        }
+        Command::Slurm(arguments) => with_warnings(slurm::run(arguments)),
+        Command::Demo => with_warnings(demo::run()),
     };
     let exit = exit.unwrap_or_else(|error| {
         match error.downcast_ref() {
@@ -234,6 +218,12 @@ pub fn main() -> ExitCode {
         Exit::of(&error)
     });
     ExitCode::from(exit.code())
+}
+
+/// Runs a command whose log has warnings and errors.
+fn with_warnings(command: impl Future<Output = anyhow::Result<Exit>>) -> anyhow::Result<Exit> {
+    let _lines = log::start(LevelFilter::WARN);
+    with_runtime(command)
 }
 
 fn with_runtime(command: impl Future<Output = anyhow::Result<Exit>>) -> anyhow::Result<Exit> {

@@ -154,6 +154,10 @@ pub struct Config {
 
     #[command(flatten)]
     #[allow(missing_docs)] // a doc comment here would become the help of the command
+    pub placement: Placement,
+
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the command
     pub telemetry: Telemetry,
 }
 
@@ -294,6 +298,74 @@ impl Tls {
             })),
         }
     }
+}
+
+/// Who places workers elsewhere.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Placement {
+    /// Whether the service itself submits workers to Slurm, as jobs waiting for them need
+    #[arg(long, env = "SIGNORINI_SLURM", value_enum, default_value_t = Placing::Off, requires_if("auto", "slurm_server"))]
+    pub slurm: Placing,
+
+    /// Address of this service as the nodes of the cluster reach it; required with `--slurm auto`
+    #[arg(long, env = "SIGNORINI_SLURM_SERVER", value_name = "URL")]
+    pub slurm_server: Option<String>,
+
+    /// Maximum number of workers in Slurm (pilots), one for a node
+    #[arg(long, env = "SIGNORINI_SLURM_PILOTS", default_value_t = 4, value_name = "N",
+          value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub slurm_pilots: u16,
+
+    /// Jobs that a pilot solves at the same time, each on one processor [default: a pilot takes a whole node]
+    #[arg(long, env = "SIGNORINI_SLURM_SLOTS", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub slurm_slots: Option<u16>,
+
+    /// Time of a pilot, in seconds
+    #[arg(long, env = "SIGNORINI_SLURM_TIME_S", default_value_t = 3600, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u32).range(60..))]
+    pub slurm_time_s: u32,
+
+    /// Seconds without a job after which a pilot ends
+    #[arg(
+        long,
+        env = "SIGNORINI_SLURM_IDLE_EXIT_S",
+        default_value_t = 60,
+        value_name = "SECONDS"
+    )]
+    pub slurm_idle_exit_s: u32,
+
+    /// File of the token of pilots, with the scope `work`
+    #[arg(long, env = "SIGNORINI_SLURM_TOKEN_FILE", value_name = "FILE")]
+    pub slurm_token_file: Option<PathBuf>,
+
+    /// PEM file, on the nodes, of the authority that issued the service's certificate
+    #[arg(long, env = "SIGNORINI_SLURM_CA", value_name = "FILE")]
+    pub slurm_ca: Option<PathBuf>,
+
+    /// The program on the nodes [default: where it is on this machine]
+    #[arg(long, env = "SIGNORINI_SLURM_PROGRAM", value_name = "FILE")]
+    pub slurm_program: Option<PathBuf>,
+
+    /// A further option of `sbatch`, such as `--partition=short`; may be repeated
+    #[arg(
+        long = "slurm-option",
+        env = "SIGNORINI_SLURM_OPTIONS",
+        value_name = "OPTION",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    pub slurm_options: Vec<String>,
+}
+
+/// Whether the service submits workers to Slurm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Display)]
+#[strum(serialize_all = "lowercase")]
+pub enum Placing {
+    /// It does not
+    #[default]
+    Off,
+    /// As many as the queue needs
+    Auto,
 }
 
 /// Settings for the log and for spans.

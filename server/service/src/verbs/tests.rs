@@ -29,8 +29,8 @@ use super::{
 };
 use crate::{
     config::{
-        Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, StoreFolder, Telemetry, Tls,
-        WEEK_S, Web,
+        Config, Isolation, MemoryBudget, Placement, ProxyTrust, RetentionLimits, StoreFolder,
+        Telemetry, Tls, WEEK_S, Web,
     },
     error::ApiError,
     formats::Format,
@@ -66,6 +66,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
         max_received_bytes: 64 << 20,
         max_sent_bytes: 128 << 20,
         grace_s: 1,
+        placement: Placement::default(),
         telemetry: Telemetry::default(),
     };
     let store = Store::open(folder).await.unwrap();
