@@ -42,6 +42,7 @@ const POLICY: &[(&str, &[&str])] = &[
             "ConvertDeck",
             "ListExamples",
             "ListWaiting",
+            "ListWorkers",
             "WatchJobs",
             "ListJobs",
             "CountJobs",

@@ -5,6 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use rpc::pb;
 use serde_json::{Value, json};
 use suite::{
     example_json,
@@ -13,7 +14,7 @@ use suite::{
 };
 use tokio::process::{Child, Command};
 
-use crate::{SIGNORINI, auth::create, meshes::file};
+use crate::{SIGNORINI, auth::create, grpc::connect, meshes::file};
 
 /// A service without slots of its own, whose leases end after two seconds.
 const ELSEWHERE: [&str; 4] = ["--workers", "0", "--lease-s", "2"];
@@ -34,6 +35,61 @@ async fn digest(server: &Server, id: &str) -> Value {
     let job = server.until_done(id).await;
     assert_eq!(job["status"], "succeeded", "{job:#}\n{}", server.log());
     server.json(&format!("/v1/jobs/{id}/result")).await["summary"]["digest"].take()
+}
+
+/// Operations: ListWorkers
+#[tokio::test]
+async fn workers_are_listed_with_what_they_do() {
+    let server = Server::start_alone(SIGNORINI, &ELSEWHERE).await;
+    assert_eq!(server.json("/v1/workers").await, json!({ "workers": [] }));
+    let _workers = ["one", "two"].map(|name| {
+        let memory = "1073741824";
+        worker(
+            &server,
+            &[
+                "--name",
+                name,
+                "--slots",
+                "2",
+                "--memory-budget-bytes",
+                memory,
+            ],
+        )
+    });
+    while server.json("/v1/queue").await["workers"] != 4 {}
+    let id = server.submit(&large()).await;
+    server.until(&id, |event| event["stage"] == "factor").await;
+    let listed = server.json("/v1/workers").await["workers"].take();
+    let listed = listed.as_array().unwrap();
+    let names: Vec<&Value> = listed.iter().map(|worker| &worker["name"]).collect();
+    assert_eq!(names, ["one", "two"]);
+    for worker in listed {
+        assert_eq!(
+            (&worker["slots"], &worker["memory_bytes"]),
+            (&json!(2), &json!(1 << 30))
+        );
+        assert!(worker["silent_s"].as_f64().unwrap() < 30.0, "{worker:#}");
+    }
+    let jobs: i64 = listed
+        .iter()
+        .map(|worker| worker["jobs"].as_i64().unwrap())
+        .sum();
+    assert_eq!(jobs, 1);
+    let queue = server.json("/v1/queue").await;
+    assert_eq!((&queue["workers"], &queue["idle"]), (&json!(4), &json!(3)));
+    let mut grpc = connect(&server).await;
+    let same = grpc
+        .list_workers(pb::ListWorkersRequest {})
+        .await
+        .unwrap()
+        .into_inner();
+    let ids: Vec<Value> = same
+        .workers
+        .into_iter()
+        .map(|worker| worker.id.into())
+        .collect();
+    let listed: Vec<Value> = listed.iter().map(|worker| worker["id"].clone()).collect();
+    assert_eq!(ids, listed);
 }
 
 #[tokio::test]

@@ -163,6 +163,8 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("ListWaitingResponse", "queue::Forecast").answer(),
     fields("WaitingJob", "queue::WaitingJob").answer(),
     fields("LoadPoint", "LoadPoint").answer(),
+    fields("ListWorkersResponse", "workers::Workers").answer(),
+    fields("Worker", "WorkerState").answer(),
     fields("ListExamplesResponse", "examples::Examples").answer(),
     fields("Example", "examples::Example").answer(),
     fields("Caller", "info::Me").answer(),

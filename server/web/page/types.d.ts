@@ -1179,3 +1179,17 @@ export type WarningKind = {
   "title": string;
   "why": string;
 };
+
+export type WorkerState = {
+  "cores": number;
+  "id": string;
+  "jobs": number;
+  "memory_bytes": number;
+  "name": string;
+  "silent_s": number;
+  "slots": number;
+};
+
+export type Workers = {
+  "workers": (WorkerState)[];
+};

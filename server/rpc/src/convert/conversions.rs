@@ -8,8 +8,8 @@ use base::{bodies, job, mesh, run::Summary, sweep, token};
 use files::MeshFormat;
 use service::{
     config::Isolation,
-    queue::LoadPoint,
-    verbs::{bulk, examples, info, jobs, lists, problems, queue, results, tokens},
+    queue::{LoadPoint, WorkerState},
+    verbs::{bulk, examples, info, jobs, lists, problems, queue, results, tokens, workers},
 };
 use solver::{accuracy, element::Element, problem, solution};
 

@@ -4,6 +4,6 @@ mod keep_alive;
 mod messages;
 mod router;
 mod service;
-mod workers;
+pub(crate) mod workers;
 
 pub use router::{report_draining, router};

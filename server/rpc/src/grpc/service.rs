@@ -33,6 +33,7 @@ use service::{
         views,
         watch::{self, AFTER_SEQ, Until, WAIT},
         watch_list::{self, ListEvent, ListPayload},
+        workers,
     },
     violations,
 };
@@ -330,6 +331,14 @@ impl JobService for Grpc {
         let (caller, _) = caller_and_message(request)?;
         let waiting = queue::waiting(&self.service, &caller).await?;
         Ok(Response::new(waiting.into()))
+    }
+
+    async fn list_workers(
+        &self,
+        request: Request<pb::ListWorkersRequest>,
+    ) -> Reply<pb::ListWorkersResponse> {
+        let (caller, _) = caller_and_message(request)?;
+        Ok(Response::new(workers::list(&self.service, &caller).into()))
     }
 
     async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use base::job::JobId;
 use service::{
     error::ApiError,
-    queue::{About, Ask, JobReport, Piece},
+    queue::{About, Ask, JobAnswer, JobReport, Piece},
     verbs::{
         Service,
         jobs::ID,
@@ -76,19 +76,8 @@ impl WorkerService for Workers {
         let (caller, pb::ReportRequest { secret, jobs }) = caller_and_message(request)?;
         let reports: Result<Vec<_>, ApiError> = jobs.into_iter().map(read).collect();
         let answers = workers::report(&self.service, &caller, &secret, reports?).await?;
-        let answers = answers.into_iter().map(|answer| pb::JobAnswer {
-            received: answer.received,
-            stored: answer.stored,
-            upload: answer.upload,
-            upload_bytes: answer.upload_bytes,
-            stop: answer.stop,
-            over: answer.over,
-            refused: answer.refused,
-            session: answer.session,
-            events: answer.events,
-        });
         Ok(Response::new(pb::ReportResponse {
-            jobs: answers.collect(),
+            jobs: answers.into_iter().map(written).collect(),
             pulse_s: workers::pace(&self.service).pulse.as_secs_f64(),
         }))
     }
@@ -117,7 +106,23 @@ fn piece(content: &[u8], offset: u64) -> Vec<u8> {
     rest[..rest.len().min(PIECE_BYTES)].to_vec()
 }
 
-fn read(report: pb::JobReport) -> Result<(JobId, i32, JobReport), ApiError> {
+/// An answer as a message.
+pub(crate) fn written(answer: JobAnswer) -> pb::JobAnswer {
+    pb::JobAnswer {
+        received: answer.received,
+        stored: answer.stored,
+        upload: answer.upload,
+        upload_bytes: answer.upload_bytes,
+        stop: answer.stop,
+        over: answer.over,
+        refused: answer.refused,
+        session: answer.session,
+        events: answer.events,
+    }
+}
+
+/// Reads a report: the job, the attempt, and what is told of it.
+pub(crate) fn read(report: pb::JobReport) -> Result<(JobId, i32, JobReport), ApiError> {
     let piece = report.piece.map(|piece| Piece {
         upload: piece.upload,
         partial: piece.partial,

@@ -11,6 +11,7 @@
 //! | taking jobs, solving them, reporting, ending | `work` |
 //! | calls of the service, and which may be repeated | `calls` |
 //! | what is to be reported of one job | `outbox` |
+//! | messages that are lost, repeated and late | `simulation.rs` |
 
 // In order of use: no file uses one below it.
 mod outbox;
@@ -19,6 +20,9 @@ mod settings;
 mod calls;
 
 mod work;
+
+#[cfg(test)]
+mod simulation;
 
 pub use self::{
     settings::Settings,

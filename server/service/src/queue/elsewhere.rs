@@ -8,7 +8,10 @@ use tokio::sync::mpsc;
 use super::{
     batch::Batch,
     ending::{NoSolution, Solved},
-    leases::{Ask, Found, Granted, JobAnswer, JobReport, Lease, Offer, Pace, Task, Told, WorkerId},
+    leases::{
+        Ask, Found, Granted, JobAnswer, JobReport, Lease, Offer, Pace, Task, Told, WorkerId,
+        WorkerState,
+    },
     running::Running,
     solving::{members_of, stored_mesh},
     state::Queue,
@@ -94,6 +97,11 @@ impl Queue {
         let mesh = Arc::new(mesh.map_err(|_| format!("mesh {hash} cannot be read"))?);
         *kept = Some(mesh.clone());
         Ok(mesh)
+    }
+
+    /// The workers that have been heard of lately, in the order of their names.
+    pub fn workers(&self) -> Vec<WorkerState> {
+        self.leases.states()
     }
 
     /// How often workers are to report.

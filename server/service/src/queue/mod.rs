@@ -75,7 +75,7 @@ pub use self::{
     feed::News,
     leases::{
         About, Ask, End, Granted, JobAnswer, JobReport, Pace, Packed, Piece, Report, Task,
-        WorkerId, solve_leased,
+        WorkerId, WorkerState, solve_leased,
     },
     load::LoadPoint,
     process::{Processes, run_worker_process},

@@ -43,6 +43,11 @@ pub fn metrics<'a>(
             f64::from(state.workers),
         );
         now.gauge("signorini_workers_idle", "Idle workers", state.idle as f64);
+        now.gauge(
+            "signorini_workers_elsewhere",
+            "Workers on other machines that have been heard of lately",
+            service.queue.workers().len() as f64,
+        );
 
         let budget = service.store.budget();
         let help = "Memory budget that running jobs share, in bytes";

@@ -8,12 +8,27 @@ use base::{
     text::{number_of, size},
 };
 use futures_util::future::join_all;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::service::Service;
 use crate::{
     error::ApiError,
-    queue::{Ask, Granted, JobAnswer, JobReport, Pace, WorkerId},
+    queue::{Ask, Granted, JobAnswer, JobReport, Pace, WorkerId, WorkerState},
 };
+
+/// The workers on other machines.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Workers {
+    /// The workers, in the order of their names.
+    pub workers: Vec<WorkerState>,
+}
+
+/// Returns the workers that solve jobs of this service.
+pub fn list(service: &Service, _caller: &Caller) -> Workers {
+    let workers = service.queue.workers();
+    Workers { workers }
+}
 
 /// The longest time that a request for a job may wait.
 const LONGEST_WAIT: Duration = Duration::from_secs(30);

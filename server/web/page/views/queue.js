@@ -34,6 +34,8 @@ class QueueView {
   forecast = null;
   /** @type {import("../types").Info | null} */
   info = null;
+  /** Those on other machines. @type {import("../types").WorkerState[]} */
+  workers = [];
   /** @type {Map<string, Job>} */
   running = new Map();
   /** @type {import("../types").OwnerUse[]} */
@@ -111,12 +113,13 @@ class QueueView {
     const { signal } = this.closed;
     const quietly = (/** @type {string} */ path, /** @type {any} */ before) => getSurely(path, signal).catch(() => before);
     const admin = this.app.may("admin");
-    const [forecast, me, owners] = await Promise.all([
+    const [forecast, me, workers, owners] = await Promise.all([
       quietly("v1/queue/waiting", this.forecast),
       quietly("v1/me", this.me),
+      quietly("v1/workers", { workers: this.workers }),
       admin ? quietly("v1/owners", { owners: this.owners }) : { owners: [] },
     ]);
-    Object.assign(this, { forecast, me, owners: owners.owners });
+    Object.assign(this, { forecast, me, workers: workers.workers, owners: owners.owners });
     if (!signal.aborted) this.draw();
   }
 
@@ -188,6 +191,7 @@ class QueueView {
                 this.queue = await send("POST", `v1/queue/${queue.paused ? "resume" : "pause"}`);
               })}>${queue.paused ? "Resume the queue" : "Pause the queue"}</button></p>`
             : nothing}</section>
+        ${this.workers.length ? this.drawWorkers() : nothing}
         ${this.drawMe()}
         ${this.app.may("admin") ? this.drawOwners() : nothing}
         <section class="panel"><h2>For programs</h2><p><a href="docs">REST: try requests</a> · <a href="openapi.json">OpenAPI</a> · <a href="proto/signorini.proto">gRPC</a> · <a href="v1/schema/problem.json">fields of a problem</a> · <a href="metrics">metrics</a></p></section>
@@ -212,6 +216,12 @@ class QueueView {
     return html`<div class="table-box"><table><thead><tr><th scope="col">Job</th><th scope="col">Why it waits</th><th scope="col" class="number">Starts in about</th></tr></thead>
       <tbody>${waiting.map((job) => html`<tr><td class="name"><a href=${parts.jobAddress(job.id)}>${job.name ?? `…${job.id.slice(-8)}`}</a>${job.owner === "local" ? nothing : html` <span class="note">${job.owner}</span>`}</td>
         <td>${format.waits({ position: job.position, ahead: job.position - 1, reason: job.reason })}</td><td class="number">${job.starts_in_s === null ? "—" : format.duration(job.starts_in_s)}</td></tr>`)}</tbody></table></div>`;
+  }
+
+  drawWorkers() {
+    return html`<section class="panel"><h2>Workers on other machines</h2><div class="table-box"><table class="numbers"><thead><tr><th scope="col">name</th><th class="number" scope="col">jobs</th><th class="number" scope="col">slots</th><th class="number" scope="col">memory</th><th class="number" scope="col">last heard of</th></tr></thead>
+      <tbody>${this.workers.map((worker) => html`<tr><td class="name" title=${worker.id}>${worker.name}</td><td class="number">${worker.jobs}</td><td class="number">${worker.slots}</td><td class="number">${format.bytes(worker.memory_bytes)}</td>
+        <td class="number">${worker.silent_s < 2 ? "now" : `${format.duration(worker.silent_s)} ago`}</td></tr>`)}</tbody></table></div></section>`;
   }
 
   /** @param {import("../types").Info} info */

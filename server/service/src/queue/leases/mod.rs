@@ -30,7 +30,7 @@ pub use self::{
     messages::{About, Ask, End, Granted, JobAnswer, JobReport, Piece, Report, WorkerId},
     packed::Packed,
     task::{Task, solve_leased},
-    workers::Pace,
+    workers::{Pace, WorkerState},
 };
 
 pub(super) use self::{

@@ -8,6 +8,8 @@ use std::{
 
 use base::job::JobId;
 use parking_lot::Mutex;
+use schemars::JsonSchema;
+use serde::Serialize;
 use store::{Lessee, Room};
 use tokio::{
     sync::{Notify, Semaphore},
@@ -59,6 +61,25 @@ pub struct Pace {
     pub pulse: Duration,
     /// How long a lease lasts that is not renewed.
     pub lease: Duration,
+}
+
+/// A worker on another machine.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct WorkerState {
+    /// Its id.
+    pub id: String,
+    /// A name for people, such as that of its machine.
+    pub name: String,
+    /// The number of jobs that it solves at the same time.
+    pub slots: u32,
+    /// The number of processors that it may use.
+    pub cores: u32,
+    /// The memory that all its jobs together may take (bytes).
+    pub memory_bytes: u64,
+    /// The number of jobs that it solves now.
+    pub jobs: u64,
+    /// The time since it was last heard of (s).
+    pub silent_s: f64,
 }
 
 /// A worker that has been heard of.
@@ -181,6 +202,29 @@ impl Leases {
             .values()
             .filter(|known| known.heard.elapsed() <= lasts);
         there.map(|known| known.about.slots as usize).sum()
+    }
+
+    /// The workers, in the order of their names.
+    pub(in crate::queue) fn states(&self) -> Vec<WorkerState> {
+        let mut jobs: BTreeMap<WorkerId, u64> = BTreeMap::new();
+        for lease in self.leases.lock().values() {
+            *jobs.entry(lease.worker.clone()).or_default() += 1;
+        }
+        let workers = self.workers.lock();
+        let mut states: Vec<WorkerState> = workers
+            .iter()
+            .map(|(id, Known { about, heard, .. })| WorkerState {
+                id: id.to_string(),
+                name: about.name.clone(),
+                slots: about.slots,
+                cores: about.cores,
+                memory_bytes: about.memory_bytes,
+                jobs: jobs.get(id).copied().unwrap_or(0),
+                silent_s: heard.elapsed().as_secs_f64(),
+            })
+            .collect();
+        states.sort_by(|one, other| (&one.name, &one.id).cmp(&(&other.name, &other.id)));
+        states
     }
 
     /// The memory of the largest worker (bytes); 0 without one.

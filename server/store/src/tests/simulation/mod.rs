@@ -95,6 +95,8 @@ struct Work {
     attempt: i32,
     /// A client has asked it to stop.
     canceled: bool,
+    /// The worker elsewhere that has it; `None`: it is solved here.
+    elsewhere: Option<Lessee>,
     /// The result, once some of it may have been written.
     parts: Option<Arc<Parts>>,
     _memory: Option<Reservation>,

@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use base::event::Payload;
+
 use super::*;
 
 const RESERVE: &str = "signorini.reserve";
@@ -70,9 +72,12 @@ impl World {
     /// The service stops and is started again.
     pub(super) async fn stop_and_start(&mut self) -> Result<()> {
         self.note("stop and start".into());
-        let running: Vec<(i64, i32, bool)> = self
+        // jobs of workers elsewhere go on
+        let here = self
             .running
             .iter()
+            .filter(|(_, work)| work.elsewhere.is_none());
+        let running: Vec<(i64, i32, bool)> = here
             .map(|(key, work)| (*key, work.attempt, work.canceled))
             .collect();
         for (key, attempt, canceled) in running {
@@ -151,12 +156,55 @@ impl World {
         keep_progress(folder, self.home.path());
         self.store.set_budget(Budget::new(BUDGET, 2, 0));
         assert_eq!(self.store.is_paused(), self.paused);
+        let asked: Vec<i64> = self
+            .listed()
+            .await
+            .iter()
+            .filter(|job| job.cancel_requested)
+            .map(|job| job.key)
+            .collect();
         let interrupted = self.store.requeue_interrupted().await.unwrap();
-        assert_eq!(interrupted, self.running.len());
-        let over = std::mem::take(&mut self.running).into_iter();
+        let (go_on, over): (BTreeMap<i64, Work>, BTreeMap<i64, Work>) =
+            std::mem::take(&mut self.running)
+                .into_iter()
+                .partition(|(key, work)| work.elsewhere.is_some() && !asked.contains(key));
+        assert_eq!(interrupted, over.len());
         self.over
-            .extend(over.map(|(key, work)| (key, work.attempt)));
+            .extend(over.into_iter().map(|(key, work)| (key, work.attempt)));
+        self.running = go_on;
+        self.check_leases().await;
         self.check(true).await;
+    }
+
+    /// The jobs that go on elsewhere are those that the store says, each at its worker and with its events.
+    async fn check_leases(&self) {
+        let mut leased = self.store.leased().await.unwrap();
+        leased.sort_by_key(|leased| leased.job.key);
+        assert!(
+            leased
+                .iter()
+                .map(|leased| &leased.job.key)
+                .eq(self.running.keys()),
+            "leases"
+        );
+        for Leased {
+            job,
+            lessee,
+            events,
+        } in leased
+        {
+            let work = &self.running[&job.key];
+            assert_eq!(
+                (job.attempt, Some(&lessee)),
+                (work.attempt, work.elsewhere.as_ref())
+            );
+            let told = self.store.events_after(job.key, 0, 100_000).await.unwrap();
+            let told = told.iter().map(|event| event.read().unwrap());
+            let of_solver = told.filter(|event| {
+                event.attempt == job.attempt && matches!(event.payload, Payload::Iteration(_))
+            });
+            assert_eq!(events, of_solver.count() as u64, "events of {}", job.key);
+        }
     }
 
     pub(super) async fn fill_the_disk(&mut self) -> Result<()> {

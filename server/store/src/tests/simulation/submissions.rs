@@ -254,7 +254,7 @@ impl World {
             assert!(old.is_none(), "a number is given once");
         }
         if let Some(claim) = accepted.claim {
-            self.started(claim).await;
+            self.started(claim, None).await;
         }
     }
 }

@@ -18,9 +18,12 @@ impl World {
         if self.paused {
             return Ok(());
         }
+        if self.once_in(3) {
+            return self.claim_elsewhere().await;
+        }
         self.note("claim".into());
         match self.store.claim_next().await?.0 {
-            Some(claim) => self.started(claim).await,
+            Some(claim) => self.started(claim, None).await,
             None => {
                 let waits = self.listed().await.iter().any(Job::waits_for_a_worker);
                 assert!(!waits || self.store.budget().is_short(), "none was claimed");
@@ -29,8 +32,33 @@ impl World {
         Ok(())
     }
 
-    /// A job was claimed, and no other job that waits is before it.
-    pub(super) async fn started(&mut self, claim: Claim) {
+    /// A worker elsewhere takes the next job that it has room for, beside a slot here.
+    async fn claim_elsewhere(&mut self) -> Result<()> {
+        let whole = self.dice.u64(0..BUDGET);
+        let lessee = Lessee {
+            worker: format!("worker_{}", self.dice.u32(0..3)),
+            name: "node".into(),
+        };
+        let room = Room { whole, free: whole };
+        self.note(format!("{} claims, with room for {whole}", lessee.worker));
+        let places = vec![Place::Away(lessee.clone(), room), Place::Here];
+        let both = self.dice.bool();
+        let places = places.into_iter().take(if both { 2 } else { 1 }).collect();
+        let claims = self.store.claim_for(places).await?.claims;
+        assert!(claims.len() <= 2);
+        for (place, claim) in claims {
+            // of two that were claimed together, the first may be for either place
+            let elsewhere = (place == 0).then(|| lessee.clone());
+            let passed = (both || elsewhere.is_some()).then_some(whole);
+            self.started(claim, elsewhere.map(|lessee| (lessee, passed.unwrap_or(0))))
+                .await;
+        }
+        Ok(())
+    }
+
+    /// A job was claimed, here or by a worker elsewhere with this much memory, and no other job that waits and has room there
+    /// is before it.
+    pub(super) async fn started(&mut self, claim: Claim, elsewhere: Option<(Lessee, u64)>) {
         let job = &claim.job;
         self.note(format!("    {} starts, attempt {}", job.key, job.attempt));
         let jobs = self.listed().await;
@@ -46,7 +74,11 @@ impl World {
             Ordering::Equal => turn(&job.owner) < turn(&other.owner),
             order => order == Ordering::Greater,
         };
-        for other in waiting {
+        let fits = |other: &&Job| match &elsewhere {
+            Some((_, whole)) => other.memory_bytes.is_none_or(|needed| needed <= *whole),
+            None => true,
+        };
+        for other in waiting.filter(fits) {
             assert!(is_before(other), "{} has overtaken {}", job.key, other.key);
         }
         self.turn += 1;
@@ -55,6 +87,7 @@ impl World {
         let work = Work {
             attempt: job.attempt,
             canceled: false,
+            elsewhere: elsewhere.map(|(lessee, _)| lessee),
             parts: None,
             _memory: claim.memory,
         };
@@ -227,6 +260,9 @@ impl World {
         let Some((key, attempt)) = self.any_running() else {
             return Ok(());
         };
+        if self.running[&key].elsewhere.is_some() && self.once_in(2) {
+            return self.give_back(key, attempt).await;
+        }
         self.note(format!("the process of {key} dies"));
         let changed = self.store.requeue_lost(key, attempt, "killed").await?;
         assert!(changed.contains(&key));
@@ -238,6 +274,21 @@ impl World {
         } else {
             assert!(matches!(status, Some(Status::Queued | Status::Failed)))
         }
+        Ok(())
+    }
+
+    /// A worker elsewhere that is to end gives its job back, which does not count.
+    async fn give_back(&mut self, key: i64, attempt: i32) -> Result<()> {
+        self.note(format!("{key} is given back"));
+        let status = self.store.requeue_drained(key, attempt).await?;
+        let work = self.running.remove(&key).unwrap();
+        self.over.push((key, attempt));
+        let expected = if work.canceled {
+            Status::Canceled
+        } else {
+            Status::Queued
+        };
+        assert_eq!(status, Some(expected));
         Ok(())
     }
 

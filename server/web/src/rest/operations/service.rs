@@ -22,6 +22,7 @@ use service::{
         info::{self as about, Info, Me, OwnerUse},
         metrics::metrics as all_metrics,
         queue::{self as verbs, Forecast, QueueState},
+        workers::{self, Workers},
     },
 };
 use solver::solution::WarningCode;
@@ -49,6 +50,10 @@ pub(super) fn operations() -> Vec<Operation> {
             .rpcs(&["ListWaiting"])
             .summary("Returns the waiting jobs, why each waits and in how many seconds it may start, and the load of the last hour")
             .answers(200, "The waiting jobs and the load", json::<Forecast>()),
+        get(READ, "/v1/workers", (), list_workers)
+            .rpcs(&["ListWorkers"])
+            .summary("Returns the workers on other machines that solve jobs of this service")
+            .answers(200, "The workers", json::<Workers>()),
         post(ADMIN, "/v1/queue/pause", (), pause_queue)
             .rpcs(&["PauseQueue"])
             .summary("Pauses the queue: no more jobs are started until it is resumed, also after a restart; running jobs continue")
@@ -147,6 +152,10 @@ async fn get_queue(call: Call) -> Result<Json<QueueState>, ApiError> {
 
 async fn list_waiting(call: Call) -> Result<Json<Forecast>, ApiError> {
     Ok(Json(verbs::waiting(&call.service, &call.caller).await?))
+}
+
+async fn list_workers(call: Call) -> Result<Json<Workers>, ApiError> {
+    Ok(Json(workers::list(&call.service, &call.caller)))
 }
 
 async fn pause_queue(call: Call) -> Result<Json<QueueState>, ApiError> {
