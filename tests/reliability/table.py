@@ -1,4 +1,4 @@
-"""The promises R1 to R35 of the service under faults and attacks: one row each, with the command that shows it.
+"""The promises R1 to R36 of the service under faults and attacks: one row each, with the command that shows it.
 
 `run.py` runs the commands and writes docs/reliability.md. A row without a command is not shown yet, and says why.
 """
@@ -123,4 +123,6 @@ ROWS = [
         missing="tested for a few problems in the unit and service tests; not a hundred times"),
     Row("G9", "Over all these attacks no server takes more memory than the budget of its jobs and 256 MiB", "peaks.py", "peaks.py --soak"),
     Row("R35", "A page in a browser re-attaches after a restart", "page.py", "page.py", needs=("chromium",)),
+    Row("R36", "Workers on other machines that are killed or cut off, and a service that is killed under them: no job is lost or ends twice",
+        "workers.py", "workers.py --soak"),
 ]

@@ -43,7 +43,7 @@ async fn workers_are_listed_with_what_they_do() {
     let server = Server::start_alone(SIGNORINI, &ELSEWHERE).await;
     assert_eq!(server.json("/v1/workers").await, json!({ "workers": [] }));
     let _workers = ["one", "two"].map(|name| {
-        let memory = "1073741824";
+        let memory = "4294967296";
         worker(
             &server,
             &[
@@ -66,7 +66,7 @@ async fn workers_are_listed_with_what_they_do() {
     for worker in listed {
         assert_eq!(
             (&worker["slots"], &worker["memory_bytes"]),
-            (&json!(2), &json!(1 << 30))
+            (&json!(2), &json!(1_u64 << 32))
         );
         assert!(worker["silent_s"].as_f64().unwrap() < 30.0, "{worker:#}");
     }

@@ -98,6 +98,16 @@ struct Known {
     wake: Arc<Notify>,
 }
 
+impl Known {
+    /// How long it has not been heard of; one that waits for a job is heard of all the time.
+    fn silence(&self) -> Duration {
+        match self.waiting {
+            0 => self.heard.elapsed(),
+            _ => Duration::ZERO,
+        }
+    }
+}
+
 /// What has become of the last request of a worker.
 #[derive(Debug)]
 enum Bid {
@@ -161,6 +171,7 @@ impl Drop for Waiting<'_> {
     fn drop(&mut self) {
         if let Some(known) = self.leases.workers.lock().get_mut(&self.worker) {
             known.waiting = known.waiting.saturating_sub(1);
+            known.heard = Instant::now(); // until now
         }
     }
 }
@@ -198,9 +209,7 @@ impl Leases {
     pub(in crate::queue) fn slots(&self) -> usize {
         let lasts = self.lasts();
         let workers = self.workers.lock();
-        let there = workers
-            .values()
-            .filter(|known| known.heard.elapsed() <= lasts);
+        let there = workers.values().filter(|known| known.silence() <= lasts);
         there.map(|known| known.about.slots as usize).sum()
     }
 
@@ -213,14 +222,14 @@ impl Leases {
         let workers = self.workers.lock();
         let mut states: Vec<WorkerState> = workers
             .iter()
-            .map(|(id, Known { about, heard, .. })| WorkerState {
+            .map(|(id, known)| WorkerState {
                 id: id.to_string(),
-                name: about.name.clone(),
-                slots: about.slots,
-                cores: about.cores,
-                memory_bytes: about.memory_bytes,
+                name: known.about.name.clone(),
+                slots: known.about.slots,
+                cores: known.about.cores,
+                memory_bytes: known.about.memory_bytes,
                 jobs: jobs.get(id).copied().unwrap_or(0),
-                silent_s: heard.elapsed().as_secs_f64(),
+                silent_s: known.silence().as_secs_f64(),
             })
             .collect();
         states.sort_by(|one, other| (&one.name, &one.id).cmp(&(&other.name, &other.id)));
@@ -239,7 +248,7 @@ impl Leases {
         let forgotten = self.lasts() * FORGOTTEN_AFTER;
         let mut workers = self.workers.lock();
         if !workers.contains_key(worker) {
-            workers.retain(|_, known| known.heard.elapsed() <= forgotten || known.waiting > 0);
+            workers.retain(|_, known| known.silence() <= forgotten);
             if workers.len() >= MOST_WORKERS {
                 return Found::TooMany;
             }
