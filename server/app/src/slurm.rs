@@ -13,8 +13,9 @@ use tokio::{io::AsyncWriteExt, process::Command, time::timeout};
 const PATIENCE: Duration = Duration::from_secs(10);
 /// How long before the end of its time a pilot is told to end (s); it takes no more jobs then.
 const WARNING_S: u32 = 60;
-/// How long its jobs may go on after that (s); then they are given back.
-const GRACE_S: u32 = 40;
+/// How long its jobs may go on after that, or after SIGTERM (s); then they are given back. Slurm kills a job that is canceled 30 s
+/// later, unless the cluster has another `KillWait`.
+const GRACE_S: u32 = 15;
 
 /// How pilots run.
 #[derive(Clone, Debug)]
@@ -212,7 +213,7 @@ mod tests {
         };
         let script = pilots.script();
         assert!(
-            script.contains(r"exec '/opt/a b/signorini' worker --server 'https://it'\''s here' --idle-exit 60s --grace 40s")
+            script.contains(r"exec '/opt/a b/signorini' worker --server 'https://it'\''s here' --idle-exit 60s --grace 15s")
                 && script.contains("--slots 4 --ca '/etc/$ca.pem'"),
             "{script}"
         );

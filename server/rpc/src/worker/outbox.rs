@@ -151,6 +151,7 @@ impl Outbox {
     pub(super) fn give_back(&self) {
         self.given_back.store(true, Relaxed);
         self.stop.store(true, Relaxed);
+        self.room.notify_all();
     }
 
     /// Enters how the job has ended; the first end counts.
@@ -208,7 +209,9 @@ impl Outbox {
                 return report;
             }
         }
-        report.end = state.end.clone();
+        let end = state.end.as_ref().filter(|end| end.len() <= *left);
+        *left -= end.map_or(0, Vec::len);
+        report.end = end.cloned();
         report
     }
 

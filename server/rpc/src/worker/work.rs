@@ -2,7 +2,10 @@
 
 use std::{
     collections::BTreeMap,
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering::Relaxed},
+    },
     time::{Duration, Instant},
 };
 
@@ -58,6 +61,8 @@ struct Worker {
     meshes: Mutex<Vec<(String, Arc<Vec<u8>>)>>,
     /// Why the service wants nothing of this worker.
     unwanted: Mutex<Option<String>>,
+    /// Whether the service takes no reports.
+    mute: AtomicBool,
     /// Canceled when the worker is to end.
     stop: CancellationToken,
 }
@@ -88,6 +93,7 @@ pub async fn run(
         pulse: Mutex::new(PAUSES.0),
         meshes: Mutex::default(),
         unwanted: Mutex::default(),
+        mute: AtomicBool::new(false),
         stop: stop.child_token(),
     });
     let reporting = tokio::spawn(worker.clone().report());
@@ -298,6 +304,7 @@ impl Worker {
                     (*self.pulse.lock(), pause) = (pulse, PAUSES.0);
                 }
                 Err(Failure::Final(why)) => {
+                    self.mute.store(true, Relaxed);
                     self.give_up(why);
                     return;
                 }
@@ -315,25 +322,29 @@ impl Worker {
     /// Lets the jobs go on for a while, then gives back those that have not ended.
     async fn drain(&self) {
         let outboxes = || -> Vec<Arc<Outbox>> { self.jobs.lock().values().cloned().collect() };
-        let all_over = async {
-            for outbox in outboxes() {
-                outbox.over.cancelled().await;
-            }
-        };
-        if self.unwanted.lock().is_some() || timeout(self.settings.grace, all_over).await.is_ok() {
+        let (grace, all) = (self.settings.grace, outboxes());
+        if self.mute.load(Relaxed) || timeout(grace, all_over(&all)).await.is_ok() {
             return;
         }
         let rest = outboxes();
         rest.iter().for_each(|outbox| outbox.give_back());
-        let all_over = async {
-            for outbox in rest {
-                outbox.over.cancelled().await;
-            }
-        };
-        if timeout(STOP_GRACE, all_over).await.is_err() {
+        if timeout(STOP_GRACE, all_over(&rest)).await.is_ok() {
+            return;
+        }
+        // without their solvers, which take long to stop; nobody waits for them
+        rest.iter()
+            .for_each(|outbox| outbox.finish(&End::GivenBack, None));
+        if timeout(STOP_GRACE, all_over(&rest)).await.is_err() {
             warn!(
                 "the service did not confirm that it got back the jobs: it will miss them when their leases end"
             );
         }
+    }
+}
+
+/// Waits until the service needs nothing more of these jobs.
+async fn all_over(outboxes: &[Arc<Outbox>]) {
+    for outbox in outboxes {
+        outbox.over.cancelled().await;
     }
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use base::{event::Payload, sweep::MemberRow, time::Time};
 use store::Parts;
+use tokio::sync::OwnedSemaphorePermit;
 
 /// The most events in a batch.
 const MOST_EVENTS: usize = 50;
@@ -19,6 +20,8 @@ pub(super) struct Batch {
     pub(super) members: Vec<(Time, MemberRow)>,
     /// A partial result that the solver has reported after the events.
     pub(super) partial: Option<Arc<Parts>>,
+    /// The memory for a partial result that came from a worker elsewhere, until it is stored.
+    pub(super) room: Option<OwnedSemaphorePermit>,
     /// Whether the problem has one load level on one grid, so that the job ends with its iterations.
     pub(super) one_level: bool,
     /// The number of reports in the batch.
@@ -32,7 +35,9 @@ impl Batch {
     pub(super) fn add(&mut self, more: Batch) {
         self.events.extend(more.events);
         self.members.extend(more.members);
-        self.partial = more.partial.or(self.partial.take());
+        if more.partial.is_some() {
+            (self.partial, self.room) = (more.partial, more.room);
+        }
         self.one_level |= more.one_level;
         self.reports += more.reports;
     }

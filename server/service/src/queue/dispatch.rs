@@ -102,7 +102,7 @@ impl Queue {
         if self.stopping.is_cancelled() || self.store.is_paused() {
             return Ok(false);
         }
-        let mut offers = Offers::take(self, most);
+        let mut offers = Offers::take(self);
         if slots.is_empty() && offers.taken.is_empty() {
             return Ok(false);
         }
@@ -235,6 +235,8 @@ impl Queue {
         let mut requeuing = RepeatedError::new("lost jobs could not be requeued");
         let mut forgetting = RepeatedError::new("ids of deleted jobs could not be removed");
         loop {
+            // one that is gone has no room for anybody
+            self.store.budget().set_elsewhere(self.leases.largest());
             let seen = self.state();
             self.last_hour
                 .see(Time::now(), seen.queued as u64, seen.running as u64);
@@ -264,8 +266,8 @@ struct Offers<'a> {
 }
 
 impl Offers<'_> {
-    fn take(queue: &Queue, most: usize) -> Offers<'_> {
-        let taken = queue.leases.take_offers(most);
+    fn take(queue: &Queue) -> Offers<'_> {
+        let taken = queue.leases.take_offers();
         let taken = taken.into_iter().map(Some).collect();
         Offers { queue, taken }
     }

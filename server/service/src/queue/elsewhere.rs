@@ -17,6 +17,9 @@ use super::{
     state::Queue,
 };
 
+/// How long a claim may take.
+const LONGEST_CLAIM: Duration = Duration::from_secs(2);
+
 /// The error that there are as many workers as there may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooManyWorkers;
@@ -30,6 +33,8 @@ impl Queue {
         wait: Duration,
     ) -> Result<Option<Arc<Granted>>, TooManyWorkers> {
         let number = ask.number;
+        // of one that ends, a claim may be under way: it must not miss what it gets
+        let wait = if ask.takes { wait } else { LONGEST_CLAIM };
         let waiting = match self.leases.ask(worker, ask) {
             Found::Granted(granted) => return Ok(Some(granted)),
             Found::Nothing => return Ok(None),
@@ -93,8 +98,14 @@ impl Queue {
             .mesh
             .as_ref()
             .ok_or("the job has no stored mesh")?;
-        let mesh = stored_mesh(&self.store, hash).await;
-        let mesh = Arc::new(mesh.map_err(|_| format!("mesh {hash} cannot be read"))?);
+        let mesh = match stored_mesh(&self.store, hash).await {
+            Ok(mesh) => Arc::new(mesh),
+            Err(no_solution) => {
+                // no other worker could read it either
+                lease.fail(no_solution).await;
+                return Err(format!("mesh {hash} cannot be read"));
+            }
+        };
         *kept = Some(mesh.clone());
         Ok(mesh)
     }

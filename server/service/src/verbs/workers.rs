@@ -69,7 +69,12 @@ pub async fn lease(
         .queue
         .lease(&worker, applicant.ask, wait.min(LONGEST_WAIT))
         .await;
-    leased.map_err(|_| ApiError::Overloaded)
+    let leased = leased.map_err(|_| ApiError::Overloaded)?;
+    // the next service has jobs again
+    if leased.is_none() {
+        service.accepting()?;
+    }
+    Ok(leased)
 }
 
 /// How often workers are to report.
@@ -156,7 +161,10 @@ pub async fn report(
             answer
         }
     });
-    Ok(join_all(taking).await)
+    let answers = join_all(taking).await;
+    // a service that stops has no leases any more: what they were about goes on with the next one
+    service.accepting()?;
+    Ok(answers)
 }
 
 /// The job that was leased to a worker last, with its task.
@@ -166,6 +174,7 @@ pub fn task(
     secret: &[u8],
     (job, attempt): (JobId, i32),
 ) -> Result<Arc<Granted>, ApiError> {
+    service.accepting()?;
     let worker = WorkerId::of(secret);
     let task = service.queue.leased_task(&worker, job, attempt);
     task.map_err(ApiError::NotFound)
@@ -178,6 +187,7 @@ pub async fn mesh(
     secret: &[u8],
     (job, attempt): (JobId, i32),
 ) -> Result<Arc<Vec<u8>>, ApiError> {
+    service.accepting()?;
     let worker = WorkerId::of(secret);
     let mesh = service.queue.leased_mesh(&worker, job, attempt).await;
     mesh.map_err(ApiError::NotFound)

@@ -5,7 +5,13 @@ use std::{
     time::Duration,
 };
 
-use base::{job::Job, tasks, text::size, time::Time};
+use base::{
+    event::Payload,
+    job::{Job, Reason},
+    tasks,
+    text::size,
+    time::Time,
+};
 use parking_lot::Mutex;
 use store::Parts;
 use tokio::{
@@ -96,8 +102,8 @@ struct Upload {
     bytes: Vec<u8>,
     /// How much of it has arrived (bytes).
     arrived: u64,
-    /// The memory for it, until the next one arrives or the attempt is over.
-    _room: Option<OwnedSemaphorePermit>,
+    /// The memory for it: of a partial one until it is stored, of the last one until the attempt is over.
+    room: Option<OwnedSemaphorePermit>,
 }
 
 /// Why a report is refused.
@@ -106,6 +112,8 @@ enum Refusal {
     OutOfOrder(String),
     /// The worker is not to be trusted: its lease ends.
     Broken(String),
+    /// There is no room for the result: the job fails.
+    TooLarge(String),
 }
 
 /// Whether to go on with the rest of a report.
@@ -192,12 +200,20 @@ impl Lease {
     pub(super) async fn take(&self, report: JobReport, room: &Arc<Semaphore>) -> JobAnswer {
         *self.heard.lock() = Instant::now();
         if report.session != self.number {
-            return self.answer(JobAnswer::default());
+            return self.nothing_taken();
         }
-        let mut session = self.session.lock().await;
+        // others may wait for the recorder, which may wait for the disk
+        let Ok(mut session) = timeout(PATIENCE, self.session.lock()).await else {
+            return self.nothing_taken();
+        };
         let refused = match self.take_all(&mut session, report, room).await {
             Ok(()) => None,
             Err(Refusal::OutOfOrder(why)) => Some(why),
+            Err(Refusal::TooLarge(why)) => {
+                let failed = NoSolution::Failed(Reason::ResourceExhausted, why.clone());
+                self.pass_on(&mut session, Err(failed)).await;
+                Some(why)
+            }
             Err(Refusal::Broken(why)) => {
                 let lost = format!("its worker {} ({}) {why}", self.name, self.worker);
                 self.pass_on(&mut session, Err(NoSolution::Lost(lost)))
@@ -218,6 +234,19 @@ impl Lease {
             let _ = timeout(UNTIL_STORED, self.over.cancelled()).await; // else it asks again
         }
         self.answer(answer)
+    }
+
+    /// The answer to a report of which nothing was taken.
+    pub(super) fn nothing_taken(&self) -> JobAnswer {
+        self.answer(JobAnswer::default())
+    }
+
+    /// Ends the attempt without a solution, for a reason that the worker does not know.
+    pub(in crate::queue) async fn fail(&self, no_solution: NoSolution) {
+        let mut session = self.session.lock().await;
+        if !session.ended {
+            self.pass_on(&mut session, Err(no_solution)).await;
+        }
     }
 
     /// Completes an answer.
@@ -266,6 +295,9 @@ impl Lease {
                 broken(format_args!("sent an end that cannot be read: {error}"))
             })?;
             let solved = match end {
+                End::Solved { ending, .. } if !ending.status.is_terminal() => {
+                    return Err(broken(format_args!("sent an end that is none")));
+                }
                 End::Solved {
                     ending,
                     unverified,
@@ -304,6 +336,9 @@ impl Lease {
         };
         match report {
             Report::OneLevel => batch.one_level = true,
+            Report::Event(Payload::Status { .. } | Payload::Done { .. }) => {
+                return Err(broken(format_args!("sent an event of the service")));
+            }
             Report::Event(payload) => batch.events.push((Time::now(), payload)),
             Report::Member(row) => batch.members.push((Time::now(), *row)),
         }
@@ -328,9 +363,7 @@ impl Lease {
             return Ok(()); // it has arrived
         }
         if piece.upload > upload.number {
-            let most = self
-                .largest_result()
-                .min(u64::from(MOST_ARRIVING_KIB) << 10);
+            let most = self.largest_result();
             if piece.total > most {
                 let (total, most) = (size(piece.total), size(most));
                 return Err(broken(format_args!(
@@ -339,13 +372,21 @@ impl Lease {
             }
             // what is there of the one before is not needed
             *upload = Upload::default();
-            let kib = (piece.total >> 10) as u32 + 1;
+            let most = u64::from(MOST_ARRIVING_KIB) << 10;
+            if piece.total > most {
+                let (total, most) = (size(piece.total), size(most));
+                return Err(Refusal::TooLarge(format!(
+                    "the result has {total}, and one that comes from another machine may have {most}: use a coarser mesh, or fewer \
+                     load steps"
+                )));
+            }
+            let kib = piece.total.div_ceil(1024).max(1) as u32;
             let Ok(taken) = room.clone().try_acquire_many_owned(kib) else {
                 return Ok(()); // others are arriving: it is sent again
             };
             *upload = Upload {
                 number: piece.upload,
-                _room: Some(taken),
+                room: Some(taken),
                 ..Upload::default()
             };
         }
@@ -374,6 +415,7 @@ impl Lease {
         if piece.partial {
             let batch = Batch {
                 partial: Some(Arc::new(parts)),
+                room: session.upload.room.take(),
                 ..Batch::default()
             };
             let _ = self.told.send(Told::Batch(batch)).await; // as for reports

@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use base::job::JobId;
+use base::{job::JobId, tasks};
 use parking_lot::Mutex;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -296,8 +296,9 @@ impl Leases {
         last.filter(|granted| granted.number == number)
     }
 
-    /// Takes the offers of at most `most` workers that wait for a job. Each must be granted a job, or given back.
-    pub(in crate::queue) fn take_offers(&self, most: usize) -> Vec<Offer> {
+    /// Takes the offers of workers that wait for a job: of all, since the next job may have room at one only. Each must be granted
+    /// a job, or given back.
+    pub(in crate::queue) fn take_offers(&self) -> Vec<Offer> {
         let mut workers = self.workers.lock();
         let waiting = workers
             .iter_mut()
@@ -314,7 +315,7 @@ impl Leases {
                 },
             }
         };
-        waiting.take(most).map(take).collect()
+        waiting.map(take).collect()
     }
 
     /// Gives back an offer that was taken, unless it was granted a job.
@@ -381,7 +382,12 @@ impl Leases {
             known.heard = Instant::now();
         }
         match self.lease_of(worker, job, attempt) {
-            Ok(lease) => lease.take(report, &self.room).await,
+            Ok(lease) => {
+                let (room, nothing) = (self.room.clone(), lease.nothing_taken());
+                // to its end, also if the connection breaks: half of a report must not count as taken
+                let taking = async move { lease.take(report, &room).await };
+                tasks::detached(taking).await.unwrap_or(nothing)
+            }
             Err(why) => JobAnswer {
                 over: true,
                 refused: Some(why),

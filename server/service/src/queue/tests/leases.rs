@@ -332,11 +332,31 @@ async fn a_worker_that_is_not_to_be_trusted_loses_its_job_and_nothing_is_stored(
         end: Some(b"{}".to_vec()),
         ..JobReport::default()
     };
+    let first = rig.store.events_after(job.key, 0, 1).await.unwrap();
+    let of_service = Report::Event(first[0].read().unwrap().payload);
+    let forged = JobReport {
+        reports: vec![serde_json::to_vec(&of_service).unwrap()],
+        ..JobReport::default()
+    };
+    let unending = End::Solved {
+        ending: Ending {
+            status: Status::Queued,
+            ..Ending::canceled()
+        },
+        unverified: false,
+        iterations: 1,
+    };
+    let unending = JobReport {
+        end: Some(serde_json::to_vec(&unending).unwrap()),
+        ..JobReport::default()
+    };
     let mut attempts = vec![
         (with(huge), "announced a result of 10"),
         (with(hash), "SHA-256"),
         (nonsense, "a report that cannot be read"),
         (no_end, "an end that cannot be read"),
+        (forged, "an event of the service"),
+        (unending, "an end that is none"),
     ];
     for parts in wrong_results() {
         let packed = Packed::new(parts).unwrap();
@@ -432,6 +452,26 @@ async fn a_job_that_no_worker_has_room_for_waits_and_others_pass_it() {
     let mut other = Played::new(&rig, "two");
     other.memory = 70 * MIB;
     assert_eq!(other.next().await.id, large.id);
+}
+
+#[tokio::test]
+async fn a_job_goes_to_the_worker_that_has_room_whichever_waits_beside_it() {
+    for secrets in [["one", "two"], ["two", "one"]] {
+        let rig = rig_without_slots().await;
+        let [small, mut large] = secrets.map(|secret| Played::new(&rig, secret));
+        large.memory = 90 * MIB;
+        let job = NewJob {
+            memory_bytes: 80 * MIB,
+            ..new(0)
+        };
+        let (nothing, held, job) = tokio::join!(
+            small.ask(Duration::from_millis(300)),
+            large.ask(LONG),
+            rig.submit_as(job)
+        );
+        assert!(nothing.is_none());
+        assert_eq!(held.unwrap().id, job.id);
+    }
 }
 
 #[tokio::test]
