@@ -4,8 +4,9 @@
 use std::{
     fs::File,
     path::{Path, PathBuf},
-    pin::Pin,
+    pin::{Pin, pin},
     process::{ExitStatus, Stdio},
+    sync::{Mutex, PoisonError},
     time::Duration,
 };
 
@@ -17,7 +18,7 @@ use tempfile::TempDir;
 use tokio::{
     io::{AsyncBufReadExt, BufReader},
     process::{Child, Command},
-    sync::{RwLock, RwLockReadGuard, RwLockWriteGuard},
+    sync::Notify,
     time::timeout,
 };
 
@@ -27,15 +28,62 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// Where a server listens whose port does not matter.
 const ANY_PORT: &str = "127.0.0.1:0";
 
-/// Tests that need the whole machine do not share it with others.
-static MACHINE: RwLock<()> = RwLock::const_new(());
+/// Tests that need the whole machine do not share it with others. Those who wait for all of it let others begin: a test may have a
+/// part of it, and need another for a second server.
+static MACHINE: Machine = Machine {
+    shares: Mutex::new(0),
+    changed: Notify::const_new(),
+};
+
+struct Machine {
+    /// How many have a part of it; `ALL`: one has all of it.
+    shares: Mutex<usize>,
+    changed: Notify,
+}
+
+const ALL: usize = usize::MAX;
 
 /// A share of the machine, or all of it.
 #[derive(Debug)]
-#[allow(dead_code)] // held, not read
-enum Share {
-    Part(RwLockReadGuard<'static, ()>),
-    All(RwLockWriteGuard<'static, ()>),
+struct Share;
+
+impl Share {
+    async fn part() -> Share {
+        Share::once(|shares| (shares != ALL).then(|| shares + 1)).await
+    }
+
+    async fn all() -> Share {
+        Share::once(|shares| (shares == 0).then_some(ALL)).await
+    }
+
+    /// Waits until `then` gives the next number of shares.
+    async fn once(then: impl Fn(usize) -> Option<usize>) -> Share {
+        loop {
+            let mut changed = pin!(MACHINE.changed.notified());
+            changed.as_mut().enable();
+            {
+                let mut shares = MACHINE.shares.lock().unwrap();
+                if let Some(next) = then(*shares) {
+                    *shares = next;
+                    return Share;
+                }
+            }
+            changed.await;
+        }
+    }
+}
+
+impl Drop for Share {
+    fn drop(&mut self) {
+        // also of a test that fails
+        let mut shares = MACHINE
+            .shares
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        *shares = if *shares == ALL { 0 } else { *shares - 1 };
+        drop(shares);
+        MACHINE.changed.notify_waiters();
+    }
 }
 
 /// A running server and the folder that outlives it.
@@ -54,13 +102,13 @@ pub struct Server {
 impl Server {
     /// Starts `binary` on a free port with an empty store, and waits for its address.
     pub async fn start(binary: &'static str, arguments: &[&str]) -> Server {
-        let share = Share::Part(MACHINE.read().await);
+        let share = Share::part().await;
         Server::start_with(binary, arguments, share).await
     }
 
     /// The same, with no other test beside it.
     pub async fn start_alone(binary: &'static str, arguments: &[&str]) -> Server {
-        let share = Share::All(MACHINE.write().await);
+        let share = Share::all().await;
         Server::start_with(binary, arguments, share).await
     }
 

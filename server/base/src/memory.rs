@@ -77,11 +77,6 @@ impl Budget {
         self.elsewhere.store(bytes, Ordering::Relaxed);
     }
 
-    /// The memory that one job may need (bytes): here, or at the largest worker elsewhere.
-    pub fn largest(&self) -> u64 {
-        self.bytes.max(self.elsewhere())
-    }
-
     /// Whether a job of this estimated memory (bytes; `None`: unknown) can be solved neither here nor by a worker that is there.
     pub fn fits_nowhere(&self, needed: Option<u64>) -> bool {
         let here = if self.jobs == 0 { 0 } else { self.bytes };

@@ -3,6 +3,7 @@
 use std::{
     error::Error as _,
     fmt::{self, Display, Formatter},
+    path::Path,
     sync::OnceLock,
     time::Duration,
 };
@@ -133,8 +134,18 @@ impl Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
+/// The token in a file, if one is given, or else that of [`token_for`].
+pub(super) fn token_in(file: Option<&Path>, url: &str) -> anyhow::Result<Option<String>> {
+    let Some(file) = file else {
+        return token_for(url);
+    };
+    let text = std::fs::read_to_string(file);
+    let text = text.with_context(|| format!("{} cannot be read", file.display()))?;
+    Ok(Some(text.trim().to_owned()))
+}
+
 /// The token of the environment, or else the one that `login` has kept for this address.
-pub(super) fn token_for(url: &str) -> anyhow::Result<Option<String>> {
+fn token_for(url: &str) -> anyhow::Result<Option<String>> {
     let given = std::env::var("SIGNORINI_TOKEN").unwrap_or_default();
     match given.trim() {
         "" => {

@@ -6,7 +6,7 @@ use anyhow::Context;
 use app::slurm::{self, Pilots};
 use clap::{Args, Subcommand};
 
-use super::{exit::Exit, output, service::token_for, table::table, token::duration_s};
+use super::{exit::Exit, output, service::token_in, table::table, token::duration};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -42,16 +42,16 @@ struct Up {
     nodes: u16,
 
     /// Time of a pilot, such as 30m or 4h. A minute before its end it gives back the jobs that it cannot finish
-    #[arg(long, value_name = "TIME", default_value = "1h", value_parser = duration_s)]
-    time: f64,
+    #[arg(long, value_name = "TIME", default_value = "1h", value_parser = duration)]
+    time: Duration,
 
     /// Jobs that a pilot solves at the same time, each on one processor [default: a pilot takes a whole node]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     slots: Option<u16>,
 
     /// A pilot ends when it was without a job for this time
-    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration_s)]
-    idle_exit: f64,
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration)]
+    idle_exit: Duration,
 
     /// File of a token with the scope `work`, on this machine [default: the token in SIGNORINI_TOKEN, or the one that `login`
     /// has kept]
@@ -95,17 +95,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
 
 fn pilots(up: Up) -> anyhow::Result<Pilots> {
     let server = up.server.server;
-    let token = match &up.token_file {
-        Some(file) => {
-            let text = std::fs::read_to_string(file);
-            let text = text.with_context(|| format!("{} cannot be read", file.display()))?;
-            Some(text.trim().to_owned())
-        }
-        None => token_for(&server)?,
-    };
-    let seconds = |seconds: f64| {
-        Duration::try_from_secs_f64(seconds).context("a time is negative, or too long")
-    };
+    let token = token_in(up.token_file.as_deref(), &server)?;
     Ok(Pilots {
         token,
         program: match up.program {
@@ -116,8 +106,8 @@ fn pilots(up: Up) -> anyhow::Result<Pilots> {
         },
         ca: up.ca,
         slots: up.slots,
-        time: seconds(up.time)?,
-        idle_exit: seconds(up.idle_exit)?,
+        time: up.time,
+        idle_exit: up.idle_exit,
         options: up.options,
         server,
     })

@@ -1,6 +1,6 @@
 //! The command `signorini token`: for a store that no server uses, or through a running service.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use anyhow::{Context, bail};
 use base::{caller::Caller, time::Time, token::Token};
@@ -290,8 +290,14 @@ fn listed(tokens: &[Token]) -> String {
     table(["ID", "OWNER", "NAME", "SCOPES", "STATE"], &rows)
 }
 
+/// Reads a duration as [`duration_s`] does.
+pub(super) fn duration(text: &str) -> Result<Duration, String> {
+    let seconds = Duration::try_from_secs_f64(duration_s(text)?);
+    seconds.map_err(|_| "a time is negative, or too long".into())
+}
+
 /// Reads a duration: seconds, or a number with one of the units s, m, h, d.
-pub(super) fn duration_s(text: &str) -> Result<f64, String> {
+fn duration_s(text: &str) -> Result<f64, String> {
     let (number, unit) = match text.strip_suffix(['s', 'm', 'h', 'd']) {
         Some(number) => (number, &text[number.len()..]),
         None => (text, "s"),

@@ -20,7 +20,7 @@ use tokio_util::sync::CancellationToken;
 use tonic::transport::{Channel, Endpoint};
 use tracing::{info, level_filters::LevelFilter};
 
-use super::{client::Trust, exit::Exit, serve, service::token_for, token::duration_s};
+use super::{client::Trust, exit::Exit, serve, service::token_in, token::duration};
 
 /// How long making a connection may take.
 const CONNECT: Duration = Duration::from_secs(10);
@@ -53,13 +53,13 @@ pub(super) struct Arguments {
     memory: MemoryBudget,
 
     /// End when there was no job for this time, such as 60s or 10m [default: never]
-    #[arg(long, value_name = "TIME", value_parser = duration_s)]
-    idle_exit: Option<f64>,
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    idle_exit: Option<Duration>,
 
     /// How long running jobs may go on after SIGTERM, SIGINT or SIGUSR1; then they are given back, and another worker solves
     /// them
-    #[arg(long, value_name = "TIME", default_value = "10s", value_parser = duration_s)]
-    grace: f64,
+    #[arg(long, value_name = "TIME", default_value = "10s", value_parser = duration)]
+    grace: Duration,
 
     /// A name for people [default: the name of this machine]
     #[arg(long, value_name = "NAME")]
@@ -86,14 +86,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         _ => return serve::work().await,
     };
     let channel = channel(&url, &arguments.trust)?;
-    let token = match &arguments.token_file {
-        Some(file) => {
-            let text = std::fs::read_to_string(file);
-            let text = text.with_context(|| format!("{} cannot be read", file.display()))?;
-            Some(text.trim().to_owned())
-        }
-        None => token_for(&url)?,
-    };
+    let token = token_in(arguments.token_file.as_deref(), &url)?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let slots = arguments.slots.unwrap_or(cores.min(1024) as u16);
     let settings = Settings {
@@ -101,8 +94,8 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         slots,
         cores: cores as u32,
         memory_bytes: arguments.memory.bytes(),
-        idle_exit: arguments.idle_exit.map(seconds).transpose()?,
-        grace: seconds(arguments.grace)?,
+        idle_exit: arguments.idle_exit,
+        grace: arguments.grace,
     };
     allocator::keep_freed_memory();
     let stop = CancellationToken::new();
@@ -124,10 +117,6 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             Err(error).with_context(|| format!("{url} does not accept this worker"))
         }
     }
-}
-
-fn seconds(seconds: f64) -> anyhow::Result<Duration> {
-    Duration::try_from_secs_f64(seconds).context("a time is negative, or too long")
 }
 
 fn name_of_this_machine() -> String {

@@ -34,7 +34,7 @@ pub struct Info {
     pub version: String,
     /// The version of the API.
     pub api_version: String,
-    /// The number of jobs that can run at the same time.
+    /// The number of jobs that the service itself solves at the same time; workers on other machines solve more.
     pub workers: u32,
     /// Where jobs run: on threads of the service, or in processes of their own.
     pub isolation: Isolation,
@@ -269,7 +269,7 @@ pub fn info<'a>(
             name: "signorini".into(),
             version: env!("CARGO_PKG_VERSION").into(),
             api_version: "v1".into(),
-            workers: service.queue.state().workers,
+            workers: service.config.workers.into(),
             isolation: service.config.isolation,
             limits: ServiceLimits {
                 max_body_bytes: service.config.max_body_bytes as u64,

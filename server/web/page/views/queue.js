@@ -219,7 +219,7 @@ class QueueView {
   }
 
   drawWorkers() {
-    return html`<section class="panel"><h2>Workers on other machines</h2><div class="table-box"><table class="numbers"><thead><tr><th scope="col">name</th><th class="number" scope="col">jobs</th><th class="number" scope="col">slots</th><th class="number" scope="col">memory</th><th class="number" scope="col">last heard of</th></tr></thead>
+    return html`<section class="panel"><h2>Workers on other machines</h2><div class="table-box"><table class="numbers"><thead><tr><th scope="col">name</th><th class="number" scope="col">jobs</th><th class="number" scope="col">slots</th><th class="number" scope="col">memory</th><th class="number" scope="col">heard of</th></tr></thead>
       <tbody>${this.workers.map((worker) => html`<tr><td class="name" title=${worker.id}>${worker.name}</td><td class="number">${worker.jobs}</td><td class="number">${worker.slots}</td><td class="number">${format.bytes(worker.memory_bytes)}</td>
         <td class="number">${worker.silent_s < 2 ? "now" : `${format.duration(worker.silent_s)} ago`}</td></tr>`)}</tbody></table></div></section>`;
   }

@@ -283,7 +283,7 @@ impl Lease {
                 return Ok(());
             }
         }
-        if session.received != last.max(session.received) {
+        if session.received < last {
             return Ok(());
         }
         if let Some(piece) = report.piece {
