@@ -3,7 +3,7 @@
     poison.py [--soak]
 
 What a poisoned job would do to its process is done to it from outside, with the real binary: it aborts, meets an
-illegal instruction, is killed by the system, loops without end and hears nothing. (The unit tests `queue::tests::processes` have
+illegal instruction, is killed by the system, loops without end and hears nothing. (The unit tests `rpc::worker::processes` have
 solvers that do so themselves, and one whose stack overflows.) A job whose process dies is tried again, fails as `worker_lost` after three attempts, and
 another one beside it and the next one succeed each time.
 """

@@ -254,9 +254,12 @@ impl App {
             store.set_most_running_of_owner(most.into());
         }
         let _ = LOG_FORMAT.set(config.telemetry.log_format); // there is one service in a process, but in tests
-        let solver = match config.isolation {
-            Isolation::Thread => Solver::Threads(solver::solve_on),
-            Isolation::Process => Solver::Processes(Processes::new(worker_process)),
+        let (solver, sockets) = match config.isolation {
+            Isolation::Thread => (Solver::Threads(solver::solve_on), None),
+            Isolation::Process => {
+                let (processes, sockets) = Processes::new(worker_process);
+                (Solver::Processes(processes), Some(sockets))
+            }
         };
         let open_to = open_to(config, &store);
         if open_to == OpenTo::Network && !config.allow_unauthenticated {
@@ -271,6 +274,9 @@ impl App {
         queue.go_on().await?;
         let service = Arc::new(Service::new(config.clone(), store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;
+        if let Some(sockets) = sockets {
+            tokio::spawn(grpc::serve_processes(service.clone(), sockets));
+        }
         let router = rest::router(service, grpc);
 
         let most = listener::most_connections(config.max_connections);

@@ -55,6 +55,7 @@ use std::{env, ffi::OsString, process::ExitCode};
 use ::service::error::ApiError;
 use app::WORKER;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use tokio::runtime::Builder;
 use tracing::level_filters::LevelFilter;
 use web::rest;
 
@@ -200,7 +201,8 @@ pub fn main() -> ExitCode {
         }
         Command::Worker(arguments) => {
             let _lines = log::start_of_worker(arguments.log_level());
-            with_runtime(worker::run(arguments))
+            // a thread beside the solvers; more would only wake each other
+            on(Builder::new_current_thread(), worker::run(arguments))
         }
         Command::Slurm(arguments) => with_warnings(slurm::run(arguments)),
         Command::Demo => with_warnings(demo::run()),
@@ -227,9 +229,14 @@ fn with_warnings(command: impl Future<Output = anyhow::Result<Exit>>) -> anyhow:
 }
 
 fn with_runtime(command: impl Future<Output = anyhow::Result<Exit>>) -> anyhow::Result<Exit> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .enable_all()
-        .build()?;
+    on(Builder::new_multi_thread(), command)
+}
+
+fn on(
+    mut runtime: Builder,
+    command: impl Future<Output = anyhow::Result<Exit>>,
+) -> anyhow::Result<Exit> {
+    let runtime = runtime.enable_all().build()?;
     let exit = runtime.block_on(command);
     // Dropping it would wait for solvers, which cannot be interrupted. The store is closed already, so
     // the process may exit while they still run.

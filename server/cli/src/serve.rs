@@ -5,7 +5,7 @@ use std::{io::Write, time::Duration};
 use anyhow::Context;
 use app::App;
 use rustix::process::Signal;
-use service::{config::Config, queue};
+use service::config::Config;
 use tokio::signal::unix::{Signal as Signals, SignalKind, signal};
 use tracing::{info, warn};
 use tracing_appender::non_blocking::ErrorCounter;
@@ -45,22 +45,6 @@ pub(super) async fn run(config: &Config, lost: ErrorCounter) -> anyhow::Result<E
     }
     notify::stopping();
     app.stop().await;
-    Ok(Exit::Ok)
-}
-
-/// Runs a worker process: solves the tasks that the service sends. A signal to stop that reaches the service and its
-/// processes together is ignored here: the service decides about its jobs, and this process ends when the service ends.
-pub(super) async fn work() -> anyhow::Result<Exit> {
-    for kind in [
-        SignalKind::terminate(),
-        SignalKind::interrupt(),
-        SignalKind::hangup(),
-    ] {
-        // from now on it has no effect, also when this is dropped
-        let _caught = signal(kind).context("a signal cannot be caught")?;
-    }
-    let solve = || queue::run_worker_process(solver::solve_on);
-    tokio::task::spawn_blocking(solve).await??;
     Ok(Exit::Ok)
 }
 

@@ -20,7 +20,7 @@ use tokio_util::sync::CancellationToken;
 use tonic::transport::{Channel, Endpoint};
 use tracing::{info, level_filters::LevelFilter};
 
-use super::{client::Trust, exit::Exit, serve, service::token_in, token::duration};
+use super::{client::Trust, exit::Exit, service::token_in, token::duration};
 
 /// How long making a connection may take.
 const CONNECT: Duration = Duration::from_secs(10);
@@ -65,7 +65,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
 
-    /// Solve the tasks that the service sends over standard input, for `serve --isolation process`
+    /// Solve the jobs of the service whose socket is standard input, for `serve --isolation process`
     #[arg(long, hide = true)]
     stdin: bool,
 }
@@ -83,7 +83,7 @@ impl Arguments {
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let url = match arguments.server {
         Some(url) if !arguments.stdin => url,
-        _ => return serve::work().await,
+        _ => return run_as_process().await,
     };
     let channel = channel(&url, &arguments.trust)?;
     let token = token_in(arguments.token_file.as_deref(), &url)?;
@@ -95,6 +95,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         cores: cores as u32,
         memory_bytes: arguments.memory.bytes(),
         idle_exit: arguments.idle_exit,
+        process: None,
         grace: arguments.grace,
     };
     allocator::keep_freed_memory();
@@ -117,6 +118,21 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             Err(error).with_context(|| format!("{url} does not accept this worker"))
         }
     }
+}
+
+/// Runs a process of the service. A signal to stop that reaches the service and its processes together is ignored here: the
+/// service decides about its jobs, and this process ends when the service ends.
+async fn run_as_process() -> anyhow::Result<Exit> {
+    for kind in [
+        SignalKind::terminate(),
+        SignalKind::interrupt(),
+        SignalKind::hangup(),
+    ] {
+        // from now on it has no effect, also when this is dropped
+        let _caught = signal(kind).context("a signal cannot be caught")?;
+    }
+    worker::run_as_process(solver::solve_on).await?;
+    Ok(Exit::Ok)
 }
 
 fn name_of_this_machine() -> String {

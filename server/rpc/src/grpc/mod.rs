@@ -6,4 +6,6 @@ mod router;
 mod service;
 pub(crate) mod workers;
 
-pub use router::{report_draining, router};
+pub use router::{report_draining, router, serve_processes};
+
+pub(crate) use router::{FRAME_BYTES, MOST_AT_ONCE_HERE, WINDOW_BYTES};

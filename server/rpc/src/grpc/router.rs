@@ -2,12 +2,19 @@
 
 use std::{sync::Arc, time::Duration};
 
-use axum::{Router, middleware::map_response};
+use axum::{Extension, Router, middleware::map_response};
+use base::caller::{Caller, Scope};
 use futures_util::future::BoxFuture;
+use hyper::server::conn::http2;
+use hyper_util::{
+    rt::{TokioExecutor, TokioIo},
+    service::TowerToHyperService,
+};
 use service::{
     error::ApiError,
     verbs::{MAX_MESSAGE_BYTES, Service},
 };
+use tokio::{net::UnixStream, sync::mpsc};
 use tonic::{Code, Status, server::NamedService, service::Routes};
 use tonic_health::server::HealthReporter;
 
@@ -15,6 +22,12 @@ use super::{service::Grpc, workers::Workers};
 use crate::pb::{
     self, job_service_server::JobServiceServer, worker::worker_service_server::WorkerServiceServer,
 };
+
+/// The largest message between a process and this service (bytes): most results are sent in one.
+pub(crate) const MOST_AT_ONCE_HERE: usize = 10 << 20;
+/// The bytes between them in one frame, and those that may be under way.
+pub(crate) const FRAME_BYTES: u32 = 1 << 20;
+pub(crate) const WINDOW_BYTES: u32 = 4 << 20;
 
 /// Makes the gRPC routes, which share a port with REST, and the handle that sets the reported health.
 pub fn router(
@@ -34,7 +47,7 @@ async fn routes(
     let (reporter, health) = tonic_health::server::health_reporter();
     reporter.set_serving::<JobServiceServer<Grpc>>().await;
     tokio::spawn(report_health(reporter.clone(), service.clone()));
-    let workers = WorkerServiceServer::new(Workers::new(service.clone()))
+    let workers = WorkerServiceServer::new(Workers::new(service.clone(), false))
         .max_decoding_message_size(MAX_MESSAGE_BYTES);
     let jobs =
         JobServiceServer::new(Grpc::new(service)).max_decoding_message_size(MAX_MESSAGE_BYTES);
@@ -45,6 +58,31 @@ async fn routes(
         .add_service(reflection().build_v1alpha()?);
     let router = routes.into_axum_router();
     Ok((router.layer(map_response(too_large)), reporter))
+}
+
+/// Serves the contract for workers to the worker processes of this machine, at each of these sockets until it closes.
+pub async fn serve_processes(
+    service: Arc<Service>,
+    mut sockets: mpsc::UnboundedReceiver<UnixStream>,
+) {
+    let workers = WorkerServiceServer::new(Workers::new(service, true))
+        .max_decoding_message_size(MOST_AT_ONCE_HERE);
+    // nobody else has the other end
+    let router = Routes::new(workers)
+        .into_axum_router()
+        .layer(Extension(Caller::new("", [Scope::Work])));
+    while let Some(socket) = sockets.recv().await {
+        let connection = http2::Builder::new(TokioExecutor::new())
+            .max_frame_size(FRAME_BYTES)
+            .initial_stream_window_size(WINDOW_BYTES)
+            .initial_connection_window_size(WINDOW_BYTES)
+            .serve_connection(
+                TokioIo::new(socket),
+                TowerToHyperService::new(router.clone()),
+            );
+        // whatever ends it, the process ends then
+        tokio::spawn(connection);
+    }
 }
 
 /// Adds the usual details of errors to the response by which tonic refuses a message over the limit: tonic refuses it

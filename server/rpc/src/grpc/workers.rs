@@ -21,11 +21,13 @@ use crate::pb::worker::{self as pb, worker_service_server::WorkerService};
 #[derive(Debug)]
 pub(super) struct Workers {
     service: Arc<Service>,
+    /// Whether it is called by processes on this machine.
+    here: bool,
 }
 
 impl Workers {
-    pub(super) fn new(service: Arc<Service>) -> Workers {
-        Workers { service }
+    pub(super) fn new(service: Arc<Service>, here: bool) -> Workers {
+        Workers { service, here }
     }
 }
 
@@ -52,6 +54,7 @@ impl WorkerService for Workers {
                     slots: request.slots,
                     cores: request.cores,
                     memory_bytes: request.memory_bytes,
+                    here: self.here,
                 },
             },
         };
@@ -73,9 +76,15 @@ impl WorkerService for Workers {
     }
 
     async fn report(&self, request: Request<pb::ReportRequest>) -> Reply<pb::ReportResponse> {
-        let (caller, pb::ReportRequest { secret, jobs }) = caller_and_message(request)?;
+        let (caller, request) = caller_and_message(request)?;
+        let pb::ReportRequest {
+            secret,
+            jobs,
+            free_bytes,
+        } = request;
+        let who = (secret.as_slice(), free_bytes);
         let reports: Result<Vec<_>, ApiError> = jobs.into_iter().map(read).collect();
-        let answers = workers::report(&self.service, &caller, &secret, reports?).await?;
+        let answers = workers::report(&self.service, &caller, who, reports?).await?;
         Ok(Response::new(pb::ReportResponse {
             jobs: answers.into_iter().map(written).collect(),
             pulse_s: workers::pace(&self.service).pulse.as_secs_f64(),

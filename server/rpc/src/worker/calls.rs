@@ -2,7 +2,7 @@
 
 use std::{fmt, sync::Arc, time::Duration};
 
-use service::verbs::workers::PROCESSOR;
+use service::{queue::SECRET_BYTES, verbs::workers::PROCESSOR};
 use tokio::time::timeout;
 use tonic::{
     Code, Request, Status,
@@ -14,12 +14,15 @@ use super::{
     outbox::{Key, Outbox},
     settings::Settings,
 };
+use crate::grpc::MOST_AT_ONCE_HERE;
 use crate::pb::worker::{self as pb, worker_service_client::WorkerServiceClient};
 
 /// The largest answer: a task of some hundred KiB, or a piece of one.
 const LARGEST_ANSWER: usize = 4 << 20;
 /// The bytes of all reports, pieces and ends in one call; a message may have 1 MiB.
 const PER_CALL: usize = 700 << 10;
+/// The same from a process to its service.
+const PER_CALL_HERE: usize = MOST_AT_ONCE_HERE - (1 << 20);
 /// The shortest and the longest pause before a call that failed is repeated.
 pub(super) const PAUSES: (Duration, Duration) =
     (Duration::from_millis(100), Duration::from_secs(5));
@@ -33,6 +36,8 @@ pub(super) struct Calls {
     token: Option<MetadataValue<Ascii>>,
     /// Known to this worker and the service only.
     secret: Vec<u8>,
+    /// Whether it is a process of the service, which ends with its connection.
+    is_process: bool,
 }
 
 /// Why a call has no answer.
@@ -84,18 +89,47 @@ pub(super) struct Leased {
 }
 
 impl Calls {
-    pub(super) fn new(channel: Channel, token: Option<&str>) -> Result<Calls, String> {
+    pub(super) fn new(
+        channel: Channel,
+        token: Option<&str>,
+        secret: Option<Vec<u8>>,
+    ) -> Result<Calls, String> {
         let token = token.map(|token| format!("Bearer {token}").parse());
         let token = token.transpose();
         // it is not shown: it is a secret
         let token = token.map_err(|_| "the token has characters that no token has".to_owned())?;
-        let mut secret = vec![0; 32];
-        getrandom::fill(&mut secret).map_err(|error| format!("no random numbers: {error}"))?;
+        let is_process = secret.is_some();
+        let secret = match secret {
+            Some(secret) => secret,
+            None => {
+                let mut secret = vec![0; SECRET_BYTES];
+                let filled = getrandom::fill(&mut secret);
+                filled.map_err(|error| format!("no random numbers: {error}"))?;
+                secret
+            }
+        };
         Ok(Calls {
             client: WorkerServiceClient::new(channel).max_decoding_message_size(LARGEST_ANSWER),
             token,
             secret,
+            is_process,
         })
+    }
+
+    /// The answer of a call, if it comes in time.
+    async fn in_time<T>(
+        &self,
+        time: Duration,
+        call: impl Future<Output = Result<tonic::Response<T>, Status>>,
+    ) -> Result<T, Failure> {
+        match timeout(time, call).await {
+            Ok(Ok(answer)) => Ok(answer.into_inner()),
+            Ok(Err(status)) => Err(match Failure::from(status) {
+                Failure::Passing(why) if self.is_process => Failure::Final(why),
+                failure => failure,
+            }),
+            Err(_) => Err(Failure::Passing("it does not answer".into())),
+        }
     }
 
     fn request<T>(&self, message: T) -> Request<T> {
@@ -131,7 +165,7 @@ impl Calls {
             takes_none,
         });
         let mut client = self.client.clone();
-        let answer = in_time(wait + PATIENCE, client.lease(request)).await?;
+        let answer = self.in_time(wait + PATIENCE, client.lease(request)).await?;
         let leased = answer.job.map(|job| Leased {
             id: job.id,
             attempt: job.attempt,
@@ -144,9 +178,16 @@ impl Calls {
         Ok((leased, seconds(answer.pulse_s)))
     }
 
-    /// Reports what is in these outboxes, and enters the answers there; returns the longest time until the next report.
-    pub(super) async fn report(&self, jobs: &[(Key, Arc<Outbox>)]) -> Result<Duration, Failure> {
-        let mut left = PER_CALL;
+    /// Reports what is in these outboxes, and how much memory is free (bytes); enters the answers there; returns the longest time until the next report.
+    pub(super) async fn report(
+        &self,
+        jobs: &[(Key, Arc<Outbox>)],
+        free_bytes: u64,
+    ) -> Result<Duration, Failure> {
+        let mut left = match self.is_process {
+            true => PER_CALL_HERE,
+            false => PER_CALL,
+        };
         let reports = jobs.iter().map(|((id, attempt), outbox)| {
             let report = outbox.report(&mut left);
             pb::JobReport {
@@ -158,11 +199,12 @@ impl Calls {
         let request = self.request(pb::ReportRequest {
             secret: self.secret.clone(),
             jobs: reports.collect(),
+            free_bytes,
         });
         let mut client = self.client.clone();
-        let answer = in_time(PATIENCE, client.report(request)).await?;
+        let answer = self.in_time(PATIENCE, client.report(request)).await?;
         for (((id, _), outbox), answer) in jobs.iter().zip(answer.jobs) {
-            if let Some(why) = &answer.refused {
+            if let Some(why) = answer.refused.as_ref().filter(|_| !self.is_process) {
                 tracing::warn!(job.id = %id, "the service refused a report of {id}: {why}");
             }
             outbox.answered(&answer);
@@ -190,7 +232,7 @@ impl Calls {
                 offset: content.len() as u64,
             });
             let mut client = self.client.clone();
-            match in_time(PATIENCE, client.get_content(request)).await {
+            match self.in_time(PATIENCE, client.get_content(request)).await {
                 Ok(piece) if piece.data.is_empty() => return Err("it is cut off".into()),
                 Ok(piece) => {
                     (total, failed) = (piece.total_bytes, 0);
@@ -205,17 +247,6 @@ impl Calls {
             }
         }
         Ok(content)
-    }
-}
-
-/// The answer of a call, if it comes in time.
-async fn in_time<T>(
-    time: Duration,
-    call: impl Future<Output = Result<tonic::Response<T>, Status>>,
-) -> Result<T, Failure> {
-    match timeout(time, call).await {
-        Ok(answer) => Ok(answer?.into_inner()),
-        Err(_) => Err(Failure::Passing("it does not answer".into())),
     }
 }
 

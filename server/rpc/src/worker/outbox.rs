@@ -23,6 +23,8 @@ const MOST_UNSENT: usize = 1000;
 const MOST_REPORTS: usize = 500;
 /// The largest piece of a result in a call (bytes).
 const LARGEST_PIECE: usize = 512 << 10;
+/// The largest piece of a result from a process to its service (bytes): most results are one.
+const LARGEST_PIECE_HERE: usize = 8 << 20;
 
 /// The identity of a job's attempt: its id and number.
 pub(super) type Key = (String, i32);
@@ -43,6 +45,8 @@ pub(super) struct Outbox {
     /// Notified when reports have been sent.
     room: Condvar,
     news: Arc<News>,
+    /// Whether this is a process of the service.
+    is_process: bool,
     /// Whether the solver should stop.
     stop: AtomicBool,
     /// Whether the job is given back.
@@ -133,7 +137,7 @@ impl State {
 
 impl Outbox {
     /// An outbox that notifies `news` when there is something in it, whose reports begin in this session.
-    pub(super) fn new(news: Arc<News>, session: u64) -> Outbox {
+    pub(super) fn new(news: Arc<News>, session: u64, is_process: bool) -> Outbox {
         Outbox {
             state: Mutex::new(State {
                 session,
@@ -141,6 +145,7 @@ impl Outbox {
             }),
             room: Condvar::new(),
             news,
+            is_process,
             stop: AtomicBool::new(false),
             given_back: AtomicBool::new(false),
             over: CancellationToken::new(),
@@ -154,8 +159,9 @@ impl Outbox {
         self.room.notify_all();
     }
 
-    /// Enters how the job has ended; the first end counts.
-    pub(super) fn finish(&self, end: &End, result: Option<Packed>) {
+    /// Enters how the job has ended; the first end counts. This takes a while if there is a result.
+    pub(super) fn finish(&self, end: &End, result: Option<Parts>) {
+        let result = result.and_then(|parts| self.packed(parts));
         let mut state = self.state.lock();
         if state.end.is_some() {
             return;
@@ -168,6 +174,19 @@ impl Outbox {
         drop(state);
         self.news.ended.notify_one();
         self.news.any.notify_one();
+    }
+
+    fn packed(&self, parts: Parts) -> Option<Packed> {
+        // these types are always written
+        Packed::new(parts, !self.is_process).ok()
+    }
+
+    /// The largest piece of a result in a call (bytes).
+    fn largest_piece(&self) -> usize {
+        match self.is_process {
+            true => LARGEST_PIECE_HERE,
+            false => LARGEST_PIECE,
+        }
     }
 
     /// The next report, of at most `left` bytes, from which its size is subtracted.
@@ -194,7 +213,7 @@ impl Outbox {
         {
             let data = upload
                 .result
-                .piece(upload.received, (*left).min(LARGEST_PIECE));
+                .piece(upload.received, (*left).min(self.largest_piece()));
             *left -= data.len();
             let complete = upload.received + data.len() as u64 == upload.result.total();
             report.piece = Some(pb::Piece {
@@ -311,7 +330,7 @@ impl Supervisor for Teller {
     }
 
     fn partial(&mut self, parts: Parts) {
-        if let Ok(result) = Packed::new(parts) {
+        if let Some(result) = self.outbox.packed(parts) {
             self.outbox.state.lock().add(result, true);
             self.outbox.news.any.notify_one();
         }

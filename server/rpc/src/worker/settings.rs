@@ -15,6 +15,9 @@ pub struct Settings {
     pub memory_bytes: u64,
     /// How long it may be without a job before it ends.
     pub idle_exit: Option<Duration>,
+    /// The secret by which the service that has started it as its process knows it: then its memory is that of its job, and it
+    /// ends with its connection. `None`: it is a worker elsewhere.
+    pub process: Option<Vec<u8>>,
     /// How long its jobs may go on when it is to end; then they are given back.
     pub grace: Duration,
 }

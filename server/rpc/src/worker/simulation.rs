@@ -19,7 +19,7 @@ use base::{
     memory::Budget,
 };
 use fastrand::Rng;
-use service::queue::{About, Ask, End, Packed, Queue, Solver, Supervisor, WorkerId};
+use service::queue::{About, Ask, End, Queue, Solver, Supervisor, WorkerId};
 use store::{Ending, NewJob, Parts, QueueLimits, Store, Submission};
 
 use super::outbox::{News, Outbox, Teller};
@@ -156,6 +156,7 @@ impl World {
                 slots: 2,
                 cores: 2,
                 memory_bytes: memory,
+                here: false,
             },
         };
         let id = worker.id();
@@ -169,7 +170,7 @@ impl World {
             worker.jobs.push(Held {
                 id: granted.job.to_string(),
                 attempt: granted.attempt,
-                outbox: Arc::new(Outbox::new(Arc::<News>::default(), granted.session)),
+                outbox: Arc::new(Outbox::new(Arc::<News>::default(), granted.session, false)),
                 told: 0,
             });
         }
@@ -189,8 +190,7 @@ impl World {
                 teller.partial(Parts::of_a_summary());
             }
             if held.told == EVENTS {
-                let result = Packed::new(Parts::of_a_summary()).unwrap();
-                held.outbox.finish(&end(), Some(result));
+                held.outbox.finish(&end(), Some(Parts::of_a_summary()));
             }
         }
     }

@@ -10,13 +10,13 @@ use std::{
 };
 
 use base::{
-    memory::{Budget, Reservation},
+    memory::{Allowance, Budget, Reservation},
     run::Solve,
 };
 use parking_lot::Mutex;
-use service::queue::{End, Supervisor as _, Task, solve_leased};
+use service::queue::{End, Supervisor as _, Task, limit_memory, solve_leased};
 use tokio::{
-    sync::{Notify, OwnedSemaphorePermit, Semaphore},
+    sync::{OwnedSemaphorePermit, Semaphore},
     time::{sleep, timeout},
 };
 use tokio_util::sync::CancellationToken;
@@ -37,6 +37,8 @@ const TOGETHER: Duration = Duration::from_millis(10);
 const STOP_GRACE: Duration = Duration::from_secs(5);
 /// The part of the memory for condensed bodies that are kept for later jobs, as 1/n.
 const FOR_BODIES: u64 = 4;
+/// How many jobs there may be for each slot, with those that have ended and are being stored by the service.
+const JOBS_PER_SLOT: usize = 2;
 /// The memory for the stored forms of meshes that are kept for later jobs (bytes).
 const FOR_MESHES: usize = 256 << 20;
 
@@ -54,8 +56,6 @@ struct Worker {
     jobs: Mutex<BTreeMap<Key, Arc<Outbox>>>,
     /// Notified when there is something to report.
     news: Arc<News>,
-    /// Notified when a job has ended.
-    freed: Notify,
     /// The longest time between two reports.
     pulse: Mutex<Duration>,
     meshes: Mutex<Vec<(String, Arc<Vec<u8>>)>>,
@@ -80,16 +80,19 @@ pub async fn run(
     solve: Solve,
     stop: CancellationToken,
 ) -> Result<u64, Unwanted> {
-    let calls = Calls::new(channel, token).map_err(Unwanted)?;
+    let calls = Calls::new(channel, token, settings.process.clone()).map_err(Unwanted)?;
     let memory = settings.memory_bytes;
+    let of_bodies = match settings.process {
+        Some(_) => 0, // its memory is that of its job
+        None => memory / FOR_BODIES,
+    };
     let worker = Arc::new(Worker {
         calls,
-        budget: Budget::new(memory, settings.slots, memory / FOR_BODIES),
+        budget: Budget::new(memory, settings.slots, of_bodies),
         settings,
         solve,
         jobs: Mutex::default(),
         news: Arc::default(),
-        freed: Notify::new(),
         pulse: Mutex::new(PAUSES.0),
         meshes: Mutex::default(),
         unwanted: Mutex::default(),
@@ -109,20 +112,29 @@ pub async fn run(
 impl Worker {
     /// Asks for jobs and starts them, until the worker is to end; returns how many.
     async fn take_jobs(self: Arc<Self>) -> u64 {
-        let slots = Arc::new(Semaphore::new(self.settings.slots.into()));
+        let count = usize::from(self.settings.slots);
+        let slots = Arc::new(Semaphore::new(count));
+        // a slot is free when its solver has ended: the next job is asked for while the service stores the end
+        let places = Arc::new(Semaphore::new(JOBS_PER_SLOT * count));
         let (mut number, mut busy) = (0, Instant::now());
         loop {
-            let slot = tokio::select! {
-                slot = slots.clone().acquire_owned() => slot,
+            let free = async {
+                let place = places.clone().acquire_owned().await;
+                Some((place.ok()?, slots.clone().acquire_owned().await.ok()?))
+            };
+            let free = tokio::select! {
+                free = free => free,
                 () = self.stop.cancelled() => return number,
             };
-            let Ok(slot) = slot else { return number };
+            let Some((place, slot)) = free else {
+                return number;
+            };
             let Some(leased) = self.next_job(number + 1, &mut busy).await else {
                 return number;
             };
             number += 1;
             busy = Instant::now();
-            self.start(leased, slot).await;
+            self.start(leased, place, slot).await;
         }
     }
 
@@ -136,17 +148,16 @@ impl Worker {
             let idle = self.settings.idle_exit;
             let left = idle.map(|idle| idle.saturating_sub(busy.elapsed()));
             let ends = left == Some(Duration::ZERO) || self.stop.is_cancelled();
-            let free = self.budget.bytes() - self.budget.reserved();
             let wait = if ends {
                 Duration::ZERO
             } else {
                 left.map_or(WAIT, |left| left.min(WAIT))
             };
-            let asking = self.calls.lease(&self.settings, number, free, wait, ends);
+            let asking = self
+                .calls
+                .lease(&self.settings, number, self.free_bytes(), wait, ends);
             let answer = tokio::select! {
                 answer = asking => answer,
-                // more memory is free: the request is repeated
-                () = self.freed.notified() => continue,
                 // it is asked whether it has just got a job
                 () = self.stop.cancelled(), if !ends => continue,
             };
@@ -174,16 +185,30 @@ impl Worker {
         }
     }
 
+    /// The memory that is free (bytes).
+    fn free_bytes(&self) -> u64 {
+        self.budget.bytes() - self.budget.reserved()
+    }
+
     fn give_up(&self, why: String) {
         self.unwanted.lock().get_or_insert(why);
         self.stop.cancel();
     }
 
     /// Fetches what the job needs, and starts to solve it.
-    async fn start(self: &Arc<Self>, leased: Leased, slot: OwnedSemaphorePermit) {
+    async fn start(
+        self: &Arc<Self>,
+        leased: Leased,
+        place: OwnedSemaphorePermit,
+        slot: OwnedSemaphorePermit,
+    ) {
         let (id, attempt) = (leased.id.clone(), leased.attempt);
         info!(job.id = %id, attempt, "job {id} is leased");
-        let outbox = Arc::new(Outbox::new(self.news.clone(), leased.session));
+        let outbox = Arc::new(Outbox::new(
+            self.news.clone(),
+            leased.session,
+            self.settings.process.is_some(),
+        ));
         self.jobs
             .lock()
             .insert((id.clone(), attempt), outbox.clone());
@@ -191,14 +216,15 @@ impl Worker {
         let worker = self.clone();
         tokio::spawn(async move {
             match (task, worker.budget.reserve(leased.memory_bytes)) {
-                (Some(task), Some(memory)) => worker.solve(&leased, task, memory, &outbox).await,
+                (Some(task), Some(memory)) => {
+                    worker.solve(&leased, task, (memory, slot), &outbox).await;
+                }
                 // another worker may have more luck
                 _ => outbox.finish(&End::GivenBack, None),
             }
             outbox.over.cancelled().await;
             worker.jobs.lock().remove(&(leased.id, leased.attempt));
-            drop(slot);
-            worker.freed.notify_one();
+            drop(place);
             info!(job.id = %id, attempt, "job {id} has ended here");
         });
     }
@@ -228,6 +254,9 @@ impl Worker {
             return Ok(mesh);
         }
         let mesh = Arc::new(self.calls.content(leased, true, vec![], u64::MAX).await?);
+        if self.settings.process.is_some() {
+            return Ok(mesh);
+        }
         let mut meshes = self.meshes.lock();
         meshes.push((hash.to_owned(), mesh.clone()));
         // the oldest go, but the last one stays
@@ -243,7 +272,7 @@ impl Worker {
         self: &Arc<Self>,
         leased: &Leased,
         task: Task,
-        memory: Reservation,
+        (memory, slot): (Reservation, OwnedSemaphorePermit),
         outbox: &Arc<Outbox>,
     ) {
         let mesh = match &leased.mesh {
@@ -259,15 +288,32 @@ impl Worker {
         let (worker, solve) = (self.clone(), self.solve);
         let mut teller = Teller::new(
             outbox.clone(),
-            Box::new(move || worker.has_spare_processor()),
+            match task.threads {
+                Some(threads) => Box::new(move || threads > 1),
+                None => Box::new(move || worker.has_spare_processor()),
+            },
         );
+        let share = leased
+            .memory_bytes
+            .filter(|_| self.settings.process.is_some());
         let solving = tokio::task::spawn_blocking(move || {
             let mut memory = memory;
             memory.free_dropped();
             let mesh = mesh.as_ref().map(|mesh| mesh.as_slice());
-            let (end, result) = solve_leased(&task, mesh, solve, memory.allowance(), &mut teller);
-            // given back before the service may be asked for another job
+            let allowance = match share {
+                None => memory.allowance(),
+                Some(share) => {
+                    if let Err(error) = limit_memory(share) {
+                        warn!(%error, "the memory of a job cannot be limited: {error}");
+                    }
+                    let bodies = None;
+                    Allowance { share, bodies }
+                }
+            };
+            let (end, result) = solve_leased(&task, mesh, solve, allowance, &mut teller);
+            // given back before the service is told, and before it is asked for another job
             drop(memory);
+            drop(slot);
             match teller.stop() && teller.is_given_back() {
                 true => teller.outbox().finish(&End::GivenBack, None),
                 false => teller.outbox().finish(&end, result),
@@ -299,7 +345,7 @@ impl Worker {
             if jobs.is_empty() {
                 continue;
             }
-            match self.calls.report(&jobs).await {
+            match self.calls.report(&jobs, self.free_bytes()).await {
                 Ok(pulse) => {
                     (*self.pulse.lock(), pause) = (pulse, PAUSES.0);
                 }
@@ -323,7 +369,8 @@ impl Worker {
     async fn drain(&self) {
         let outboxes = || -> Vec<Arc<Outbox>> { self.jobs.lock().values().cloned().collect() };
         let (grace, all) = (self.settings.grace, outboxes());
-        if self.mute.load(Relaxed) || timeout(grace, all_over(&all)).await.is_ok() {
+        let is_process = self.settings.process.is_some(); // its service is gone
+        if is_process || self.mute.load(Relaxed) || timeout(grace, all_over(&all)).await.is_ok() {
             return;
         }
         let rest = outboxes();

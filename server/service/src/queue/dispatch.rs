@@ -28,12 +28,18 @@ const PAUSE_AFTER_PANIC: Duration = Duration::from_millis(100);
 impl Queue {
     /// Starts the workers. They run until the service stops.
     pub fn start(self: &Arc<Self>) {
-        if let Solver::Processes(processes) = &self.solver {
-            processes.prepare(self.workers);
-        }
-        self.slots.add_permits(usize::from(self.workers));
+        tokio::spawn(self.clone().open());
         tokio::spawn(keep_running(self.clone(), Queue::dispatch));
         tokio::spawn(keep_running(self.clone(), Queue::run_periodic_tasks));
+    }
+
+    /// Opens the slots, when their processes have started.
+    async fn open(self: Arc<Self>) {
+        if let Solver::Processes(processes) = &self.solver {
+            processes.prepare(self.workers).await;
+        }
+        self.slots.add_permits(usize::from(self.workers));
+        self.wake.notify_one();
     }
 
     /// Accepts jobs. When this function returns they are stored on the disk; a free worker is given the next job of the

@@ -3,6 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use base::job::{Job, JobId};
+use store::Room;
 use tokio::sync::mpsc;
 
 use super::{
@@ -115,6 +116,11 @@ impl Queue {
         self.leases.states()
     }
 
+    /// Notes what memory a worker has free (bytes) as it reports.
+    pub fn has_free(&self, worker: &WorkerId, free_bytes: u64) {
+        self.leases.has_free(worker, free_bytes);
+    }
+
     /// How often workers are to report.
     pub fn pace(&self) -> Pace {
         self.leases.pace()
@@ -132,6 +138,8 @@ pub(super) struct InForce {
     offer: Offer,
     lease: Arc<Lease>,
     told: Option<mpsc::Receiver<Told>>,
+    /// How many threads the solver may have; `None`: the worker decides.
+    threads: Option<usize>,
 }
 
 impl Drop for InForce {
@@ -153,15 +161,52 @@ impl InForce {
         running: &Running,
         stored_events: u64,
     ) -> InForce {
+        InForce::of(queue, offer, job.clone(), running, stored_events, None)
+    }
+
+    /// Leases a job of this share of the memory (bytes) to a process on this machine, as its job of this number.
+    pub(super) fn here(
+        queue: &Arc<Queue>,
+        (worker, number): (WorkerId, u64),
+        job: &Job,
+        running: &Running,
+        share: u64,
+    ) -> InForce {
+        let name = "this machine".to_owned();
+        let room = Room { whole: 0, free: 0 };
+        let offer = Offer {
+            worker,
+            name,
+            number,
+            room,
+        };
+        // it may use its share, and its result too
+        let job = Job {
+            memory_bytes: Some(share),
+            ..job.clone()
+        };
+        let threads = 1 + usize::from(queue.has_spare_processor());
+        InForce::of(queue, offer, job, running, 0, Some(threads))
+    }
+
+    fn of(
+        queue: &Arc<Queue>,
+        offer: Offer,
+        job: Job,
+        running: &Running,
+        stored_events: u64,
+        threads: Option<usize>,
+    ) -> InForce {
         let (worker, name) = (offer.worker.clone(), offer.name.clone());
         let session = (queue.session, stored_events, queue.leases.lasts());
-        let (lease, told) = Lease::new(job.clone(), worker, name, running.clone(), session);
+        let (lease, told) = Lease::new(job, worker, name, running.clone(), session);
         queue.leases.enter(&lease);
         InForce {
             queue: queue.clone(),
             offer,
             lease,
             told: Some(told),
+            threads,
         }
     }
 
@@ -196,7 +241,11 @@ impl InForce {
             Some(_) => Some(members_of(&self.queue.store, job.key).await?),
             None => None,
         };
-        let task = serde_json::to_vec(&Task { problem, members });
+        let task = serde_json::to_vec(&Task {
+            problem,
+            members,
+            threads: self.threads,
+        });
         let granted = Granted {
             number: self.offer.number,
             job: job.id,
@@ -206,7 +255,11 @@ impl InForce {
             session: self.queue.session,
             task: task.map_err(|error| NoSolution::Internal(error.to_string()))?,
         };
-        self.queue.leases.grant(&self.offer.worker, granted);
+        let (leases, worker) = (&self.queue.leases, &self.offer.worker);
+        match self.lease.is_here() {
+            true => leases.grant_here(worker, granted),
+            false => leases.grant(worker, granted),
+        }
         Ok(())
     }
 }

@@ -2,14 +2,14 @@
 //!
 //! `workers` slots each hold one job at a time, and so do the slots of workers elsewhere (`leases`), which ask for jobs. The
 //! dispatcher claims the next jobs of the store whenever slots are free; a submission that finds a free slot claims a job in its own transaction, and starts this job in the slot. Each
-//! claim is solved on a blocking thread, or in a process that such a thread feeds (`process`). For each running solver
+//! claim is solved on a blocking thread, or in a worker process, which speaks as a worker elsewhere does (`process`). For each running solver
 //! a recorder task commits its events in batches and then announces that there are new ones; watchers read them from
 //! the store, together. No event travels through a channel to a watcher, so none is repeated, missed, or undone by a
 //! crash.
 //!
 //! The solver tells an observer each phase and iteration, and asks it repeatedly, also within long factorisations. The
 //! observer of a job (`solving`) keeps it within its share of memory, and passes its events to a supervisor: the worker
-//! of the job, or, in a worker process, the connection to the service. The worker answers *stop* when the job was
+//! of the job, or, at a worker process and elsewhere, what is to be told to the service. The worker answers *stop* when the job was
 //! canceled or has reached its time limit. The solver asks whether there is memory before it makes large matrices; if
 //! there is none for a matrix that it needs, the job ends; on a later mesh of adaptive refinement the solver returns
 //! the result of the mesh before. After each load step but the last the supervisor receives the results so far, which
@@ -29,7 +29,8 @@
 //! | subject | where |
 //! |---|---|
 //! | starting jobs when a slot is free; periodic tasks | `dispatch` |
-//! | one job: its worker, its solution on a blocking thread or in a process, its end | `worker`, `solving`, `process`, `ending` |
+//! | one job: its worker, its solution on a blocking thread or in a process, its end | `worker`, `in_process`, `solving`, `ending` |
+//! | worker processes on this machine | `process` |
 //! | what a solver tells and asks, here or in a process | `supervisor` |
 //! | jobs at workers elsewhere: offers, leases, reports | `leases`, `elsewhere` |
 //! | events committed in batches | `recorder`, `batch` |
@@ -62,6 +63,8 @@ mod state;
 
 mod elsewhere;
 mod recorder;
+
+mod in_process;
 mod worker;
 
 mod cancel;
@@ -78,7 +81,7 @@ pub use self::{
         WorkerId, WorkerState, solve_leased,
     },
     load::LoadPoint,
-    process::{Processes, run_worker_process},
+    process::{Processes, SECRET_BYTES, limit_memory},
     state::{Queue, Solver, State},
     supervisor::Supervisor,
     watchers::Subscription,

@@ -1,8 +1,9 @@
 //! The handle on a running solver.
 
-use std::sync::{Arc, OnceLock, atomic::AtomicU64};
+use std::sync::{Arc, atomic::AtomicU64};
 
 use base::job::{Job, JobId};
+use tokio::sync::SetOnce;
 
 /// The handle on a running solver.
 #[derive(Clone, Debug)]
@@ -12,7 +13,7 @@ pub(super) struct Running {
     /// The number of the attempt.
     pub(super) attempt: i32,
     /// Set to ask the solver to stop; the solver checks it in every iteration.
-    pub(super) stop: Arc<OnceLock<StopReason>>,
+    pub(super) stop: Arc<SetOnce<StopReason>>,
     /// The number of reports of the solver that are stored.
     pub(super) stored: Arc<AtomicU64>,
     /// Whether the solver runs on this machine.

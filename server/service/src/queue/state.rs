@@ -29,7 +29,7 @@ const MOST_ORIGINS: usize = 100_000;
 pub enum Solver {
     /// On blocking threads of this process.
     Threads(Solve),
-    /// In processes that are fed by blocking threads.
+    /// In processes.
     Processes(Processes),
 }
 

@@ -3,8 +3,8 @@
 use base::{event::Payload, sweep::MemberRow};
 use store::Parts;
 
-/// The side that has a job solved. On a thread of the service this is the worker of the job, in a worker process the
-/// connection to the service: so a process solves a job as a thread does.
+/// The side that has a job solved. On a thread of the service this is the worker of the job, in a worker process, and
+/// elsewhere, what is to be told to the service: so both solve a job as a thread does.
 pub trait Supervisor {
     /// Receives that the problem has one load level on one grid: the job ends with its iterations, so that the time
     /// until then can be estimated.

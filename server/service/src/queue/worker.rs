@@ -7,6 +7,7 @@ use base::{
     failpoint::{self, Point},
     job::{Job, JobId, Status},
     memory::Reservation,
+    run::Solve,
     sweep::MemberRow,
     time::Time,
 };
@@ -23,8 +24,8 @@ use super::{
     batch::Batch,
     elsewhere::InForce,
     ending::{NoSolution, Solved, ending_of_attempt, internal, panicked, timed_out},
+    in_process,
     leases::Offer,
-    process::Task,
     recorder,
     running::{Running, StopReason},
     solving::{members_of, read_mesh, solve_task, stored_mesh},
@@ -89,22 +90,32 @@ async fn try_attempt(queue: Arc<Queue>, job: Job, running: Running, seat: Seat) 
             problem,
             mesh,
             memory,
-        } => {
-            let worker = Worker {
-                queue: queue.clone(),
-                id,
-                running: running.clone(),
-                recorder: sender,
-            };
-            let (key, in_sweep) = (job.key, job.sweep.is_some());
-            let task = (problem, mesh, in_sweep.then_some(key));
-            tokio::task::spawn_blocking(move || {
-                // given back when the solver has returned, or panicked, in this order: another job may have them then
-                let _slot = slot;
-                let memory = memory;
-                solve_here(task, memory, worker)
-            })
-        }
+        } => match &queue.solver {
+            Solver::Threads(solve) => {
+                let worker = Worker {
+                    queue: queue.clone(),
+                    id,
+                    running: running.clone(),
+                    recorder: sender,
+                };
+                let (key, in_sweep, solve) = (job.key, job.sweep.is_some(), *solve);
+                let task = (problem, mesh, in_sweep.then_some(key));
+                tokio::task::spawn_blocking(move || {
+                    // given back when the solver has returned, or panicked, in this order: another job may have them then
+                    let _slot = slot;
+                    let memory = memory;
+                    solve_on_thread(task, memory, solve, worker)
+                })
+            }
+            Solver::Processes(_) => {
+                let (queue, job, running) = (queue.clone(), job.clone(), running.clone());
+                tokio::spawn(async move {
+                    let _slot = slot; // as above
+                    let memory = memory;
+                    in_process::solve(&queue, (&job, problem), &memory, &running, sender).await
+                })
+            }
+        },
         Seat::Elsewhere { lease, problem } => {
             let lease = Arc::new(AsyncMutex::new(lease));
             in_force = Some(lease.clone());
@@ -160,42 +171,27 @@ fn tell_start(job: &Job, seat: &Seat) {
     }
 }
 
-/// Solves a claimed job on this thread, or in a process that it feeds: the problem, the hash of its mesh, and the key of a
-/// job whose members are to be solved.
-fn solve_here(
+/// Solves a claimed job on this thread: the problem, the hash of its mesh, and the key of a job whose members are to be
+/// solved.
+fn solve_on_thread(
     (problem, mesh, members): (String, Option<String>, Option<i64>),
     memory: Option<Reservation>,
+    solve: Solve,
     mut worker: Worker,
 ) -> Result<Solved, NoSolution> {
     let mut memory = memory.ok_or_else(|| NoSolution::Internal("no memory is reserved".into()))?;
     memory.free_dropped();
-    let queue = worker.queue.clone();
-    let (Queue { store, solver, .. }, now) = (&*queue, Handle::current());
-    let mesh = mesh.map(|hash| now.block_on(stored_mesh(store, &hash)));
+    let (store, now) = (worker.queue.store.clone(), Handle::current());
+    let mesh = mesh.map(|hash| now.block_on(stored_mesh(&store, &hash)));
     let mesh = mesh.transpose()?;
-    let members = members.map(|key| now.block_on(members_of(store, key)));
+    let members = members.map(|key| now.block_on(members_of(&store, key)));
     let members = members.transpose()?;
     if failpoint::fails(Point::MeshRead, worker.id) {
         return Err(NoSolution::Internal("a test wants it".into()));
     }
-    match solver {
-        Solver::Threads(solve) => {
-            let mesh = mesh.as_deref().map(read_mesh).transpose()?;
-            let allowance = memory.allowance();
-            let members = members.as_ref();
-            solve_task(&problem, mesh, members, *solve, allowance, &mut worker)
-        }
-        Solver::Processes(processes) => {
-            let task = Task {
-                problem,
-                members,
-                mesh,
-                share: memory.share(),
-                threads: worker.threads(),
-            };
-            processes.solve(task, &mut worker)
-        }
-    }
+    let mesh = mesh.as_deref().map(read_mesh).transpose()?;
+    let (allowance, members) = (memory.allowance(), members.as_ref());
+    solve_task(&problem, mesh, members, solve, allowance, &mut worker)
 }
 
 /// The worker of a job as the supervisor of its solver, on a blocking thread.

@@ -141,7 +141,7 @@ fn admitted(applicant: &Applicant) -> Result<WorkerId, ApiError> {
 pub async fn report(
     service: &Service,
     _caller: &Caller,
-    secret: &[u8],
+    (secret, free_bytes): (&[u8], u64),
     reports: Vec<(JobId, i32, JobReport)>,
 ) -> Result<Vec<JobAnswer>, ApiError> {
     if reports.len() > MOST_JOBS {
@@ -151,6 +151,7 @@ pub async fn report(
         )));
     }
     let worker = WorkerId::of(secret);
+    service.queue.has_free(&worker, free_bytes);
     let taking = reports.into_iter().map(|(job, attempt, report)| {
         let worker = &worker;
         async move {

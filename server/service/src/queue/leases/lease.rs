@@ -27,7 +27,7 @@ use super::{
         running::Running,
     },
     messages::{End, JobAnswer, JobReport, Piece, Report, WorkerId},
-    packed::unpack,
+    packed::{unpack, unpack_ours},
 };
 
 /// How many reports may wait to be recorded; after that the worker keeps them.
@@ -149,6 +149,11 @@ impl Lease {
             mesh: AsyncMutex::default(),
         };
         (Arc::new(lease), receiver)
+    }
+
+    /// Whether the worker is a process on this machine.
+    pub(in crate::queue) fn is_here(&self) -> bool {
+        self.running.here
     }
 
     /// Ends the lease: the worker's next report is told so.
@@ -358,7 +363,7 @@ impl Lease {
         piece: Piece,
         room: &Arc<Semaphore>,
     ) -> Result<(), Refusal> {
-        let upload = &mut session.upload;
+        let (upload, here) = (&mut session.upload, self.is_here());
         if piece.upload < upload.number {
             return Ok(()); // it has arrived
         }
@@ -373,7 +378,7 @@ impl Lease {
             // what is there of the one before is not needed
             *upload = Upload::default();
             let most = u64::from(MOST_ARRIVING_KIB) << 10;
-            if piece.total > most {
+            if piece.total > most && !here {
                 let (total, most) = (size(piece.total), size(most));
                 return Err(Refusal::TooLarge(format!(
                     "the result has {total}, and one that comes from another machine may have {most}: use a coarser mesh, or fewer \
@@ -381,12 +386,17 @@ impl Lease {
                 )));
             }
             let kib = piece.total.div_ceil(1024).max(1) as u32;
-            let Ok(taken) = room.clone().try_acquire_many_owned(kib) else {
-                return Ok(()); // others are arriving: it is sent again
+            // that of a process on this machine is in the memory of its job
+            let taken = match here {
+                true => None,
+                false => match room.clone().try_acquire_many_owned(kib) {
+                    Ok(taken) => Some(taken),
+                    Err(_) => return Ok(()), // others are arriving: it is sent again
+                },
             };
             *upload = Upload {
                 number: piece.upload,
-                room: Some(taken),
+                room: taken,
                 ..Upload::default()
             };
         }
@@ -408,8 +418,13 @@ impl Lease {
         }
         let bytes = std::mem::take(&mut upload.bytes);
         let most = self.largest_result();
-        let read = tasks::blocking(move || unpack(bytes, &piece.sha256, most)).await;
-        let parts = read.unwrap_or_else(|_| Err("it could not be read".into()));
+        let parts = match here {
+            true => unpack_ours(bytes),
+            false => {
+                let read = tasks::blocking(move || unpack(bytes, &piece.sha256, most)).await;
+                read.unwrap_or_else(|_| Err("it could not be read".into()))
+            }
+        };
         let parts =
             parts.map_err(|why| broken(format_args!("sent a result that is refused: {why}")))?;
         if piece.partial {

@@ -44,6 +44,8 @@ pub struct About {
     pub cores: u32,
     /// The memory that all its jobs together may take (bytes).
     pub memory_bytes: u64,
+    /// Whether it is a process on this machine: it solves the jobs of this machine's slots.
+    pub here: bool,
 }
 
 /// A request of a worker for a job.

@@ -13,12 +13,12 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// Packs a result.
+    /// Packs a result; with its SHA-256 if it is `hashed`, which a process of the service needs not.
     ///
     /// # Errors
     ///
     /// The list of the parts cannot be written.
-    pub fn new(parts: Parts) -> serde_json::Result<Packed> {
+    pub fn new(parts: Parts, hashed: bool) -> serde_json::Result<Packed> {
         let mut bodies = vec![];
         let mut list = vec![];
         for mut part in parts.into_parts() {
@@ -30,11 +30,17 @@ impl Packed {
         let mut header = (list.len() as u64).to_le_bytes().to_vec();
         header.extend(list);
         let chunks: Vec<Vec<u8>> = [header].into_iter().chain(bodies).collect();
-        let mut hash = Sha256::new();
-        chunks.iter().for_each(|chunk| hash.update(chunk));
+        let sha256 = match hashed {
+            true => {
+                let mut hash = Sha256::new();
+                chunks.iter().for_each(|chunk| hash.update(chunk));
+                hash.finalize().to_vec()
+            }
+            false => vec![],
+        };
         Ok(Packed {
             total: chunks.iter().map(|chunk| chunk.len() as u64).sum(),
-            sha256: hash.finalize().to_vec(),
+            sha256,
             chunks,
         })
     }
@@ -44,7 +50,7 @@ impl Packed {
         self.total
     }
 
-    /// The SHA-256.
+    /// The SHA-256; empty if it is not hashed.
     pub fn sha256(&self) -> &[u8] {
         &self.sha256
     }
@@ -65,12 +71,23 @@ impl Packed {
     }
 }
 
-/// Reads a result that was packed, and checks that every part can be served; at most about `most` bytes of memory are taken.
-/// `Err`: what is wrong with it.
-pub(super) fn unpack(mut bytes: Vec<u8>, sha256: &[u8], most: u64) -> Result<Parts, String> {
+/// Reads a result that was packed on another machine, and checks that every part can be served; at most about `most` bytes of
+/// memory are taken. `Err`: what is wrong with it.
+pub(super) fn unpack(bytes: Vec<u8>, sha256: &[u8], most: u64) -> Result<Parts, String> {
     if *Sha256::digest(&bytes) != *sha256 {
         return Err("its SHA-256 is not the one that was announced".into());
     }
+    let parts = parts_of(bytes)?;
+    store::check_parts(&parts, most)?;
+    Ok(Parts::new(parts))
+}
+
+/// Reads a result that was packed by a process of this service.
+pub(super) fn unpack_ours(bytes: Vec<u8>) -> Result<Parts, String> {
+    parts_of(bytes).map(Parts::new)
+}
+
+fn parts_of(mut bytes: Vec<u8>) -> Result<Vec<Part>, String> {
     let cut = || "its header is cut off".to_owned();
     let length = bytes
         .first_chunk()
@@ -93,8 +110,7 @@ pub(super) fn unpack(mut bytes: Vec<u8>, sha256: &[u8], most: u64) -> Result<Par
     if !rest.is_empty() {
         return Err(format!("{} bytes belong to no part", rest.len()));
     }
-    store::check_parts(&parts, most)?;
-    Ok(Parts::new(parts))
+    Ok(parts)
 }
 
 #[cfg(test)]
@@ -105,7 +121,7 @@ mod tests {
     const MOST: u64 = 1 << 20;
 
     fn packed() -> Packed {
-        Packed::new(Parts::of_a_summary()).unwrap()
+        Packed::new(Parts::of_a_summary(), true).unwrap()
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use base::{memory::Allowance, run::Solve};
 use serde::{Deserialize, Serialize};
-use store::MembersTask;
+use store::{MembersTask, Parts};
 
 use super::{
     super::{
@@ -13,7 +13,6 @@ use super::{
         supervisor::Supervisor,
     },
     messages::End,
-    packed::Packed,
 };
 
 /// What a worker is to solve.
@@ -23,6 +22,8 @@ pub struct Task {
     pub problem: String,
     /// The members of a sweep that are solved together with the problem.
     pub members: Option<MembersTask>,
+    /// How many threads may share its work; `None`: the worker decides.
+    pub threads: Option<usize>,
 }
 
 /// Solves a task on this thread, on the stored form of the mesh that its problem names; returns the end of the attempt, and
@@ -33,7 +34,7 @@ pub fn solve_leased(
     solve: Solve,
     allowance: Allowance<'_>,
     supervisor: &mut dyn Supervisor,
-) -> (End, Option<Packed>) {
+) -> (End, Option<Parts>) {
     let solving = || {
         let mesh = mesh.map(read_mesh).transpose()?;
         let members = task.members.as_ref();
@@ -44,13 +45,12 @@ pub fn solve_leased(
             iterations,
             parts,
         } = solved;
-        let packed = Packed::new(parts).map_err(|error| NoSolution::Internal(error.to_string()))?;
         let end = End::Solved {
             ending,
             unverified,
             iterations,
         };
-        Ok((end, Some(packed)))
+        Ok((end, Some(parts)))
     };
     // what a panic leaves behind is not used again
     catch_unwind(AssertUnwindSafe(solving))

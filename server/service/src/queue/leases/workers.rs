@@ -99,6 +99,23 @@ struct Known {
 }
 
 impl Known {
+    fn new(about: About, number: u64) -> Known {
+        Known {
+            about,
+            heard: Instant::now(),
+            number,
+            bid: Bid::Open,
+            free_bytes: 0,
+            waiting: 0,
+            wake: Arc::default(),
+        }
+    }
+
+    fn grant(&mut self, granted: Granted) {
+        self.bid = Bid::Granted(Arc::new(granted));
+        self.wake.notify_waiters();
+    }
+
     /// How long it has not been heard of; one that waits for a job is heard of all the time.
     fn silence(&self) -> Duration {
         match self.waiting {
@@ -189,7 +206,7 @@ impl Leases {
 
     /// How often workers are to report: less often if there are many.
     pub(in crate::queue) fn pace(&self) -> Pace {
-        let workers = self.workers.lock().len() as f64;
+        let workers = self.elsewhere(&self.workers.lock()).count() as f64;
         let (shortest, longest) = PULSES;
         let lease = self.lasts();
         let longest = longest.min(lease / 4);
@@ -202,15 +219,18 @@ impl Leases {
 
     /// The number of jobs that workers elsewhere solve.
     pub(in crate::queue) fn count(&self) -> usize {
-        self.leases.lock().len()
+        let leases = self.leases.lock();
+        leases.values().filter(|lease| !lease.is_here()).count()
     }
 
     /// The number of slots of the workers that are there.
     pub(in crate::queue) fn slots(&self) -> usize {
         let lasts = self.lasts();
         let workers = self.workers.lock();
-        let there = workers.values().filter(|known| known.silence() <= lasts);
-        there.map(|known| known.about.slots as usize).sum()
+        let there = self
+            .elsewhere(&workers)
+            .filter(|(_, known)| known.silence() <= lasts);
+        there.map(|(_, known)| known.about.slots as usize).sum()
     }
 
     /// The workers, in the order of their names.
@@ -220,8 +240,8 @@ impl Leases {
             *jobs.entry(lease.worker.clone()).or_default() += 1;
         }
         let workers = self.workers.lock();
-        let mut states: Vec<WorkerState> = workers
-            .iter()
+        let mut states: Vec<WorkerState> = self
+            .elsewhere(&workers)
             .map(|(id, known)| WorkerState {
                 id: id.to_string(),
                 name: known.about.name.clone(),
@@ -239,7 +259,8 @@ impl Leases {
     /// The memory of the largest worker (bytes); 0 without one.
     pub(in crate::queue) fn largest(&self) -> u64 {
         let workers = self.workers.lock();
-        let memory = workers.values().map(|known| known.about.memory_bytes);
+        let memory = self.elsewhere(&workers);
+        let memory = memory.map(|(_, known)| known.about.memory_bytes);
         memory.max().unwrap_or(0)
     }
 
@@ -249,19 +270,13 @@ impl Leases {
         let mut workers = self.workers.lock();
         if !workers.contains_key(worker) {
             workers.retain(|_, known| known.silence() <= forgotten);
-            if workers.len() >= MOST_WORKERS {
+            if workers.len() >= MOST_WORKERS && !ask.about.here {
                 return Found::TooMany;
             }
         }
-        let known = workers.entry(worker.clone()).or_insert_with(|| Known {
-            about: ask.about.clone(),
-            heard: Instant::now(),
-            number: ask.number,
-            bid: Bid::Open,
-            free_bytes: 0,
-            waiting: 0,
-            wake: Arc::default(),
-        });
+        let known = workers
+            .entry(worker.clone())
+            .or_insert_with(|| Known::new(ask.about.clone(), ask.number));
         known.heard = Instant::now();
         known.about = ask.about;
         if known.number != ask.number {
@@ -300,9 +315,9 @@ impl Leases {
     /// a job, or given back.
     pub(in crate::queue) fn take_offers(&self) -> Vec<Offer> {
         let mut workers = self.workers.lock();
-        let waiting = workers
-            .iter_mut()
-            .filter(|(_, known)| known.waiting > 0 && matches!(known.bid, Bid::Open));
+        let waiting = workers.iter_mut().filter(|(_, known)| {
+            known.waiting > 0 && matches!(known.bid, Bid::Open) && !known.about.here
+        });
         let take = |(worker, known): (&WorkerId, &mut Known)| {
             known.bid = Bid::Taken;
             Offer {
@@ -333,9 +348,33 @@ impl Leases {
         if let Some(known) = self.workers.lock().get_mut(worker)
             && known.number == granted.number
         {
-            known.bid = Bid::Granted(Arc::new(granted));
-            known.wake.notify_waiters();
+            known.grant(granted);
         }
+    }
+
+    /// Grants a job to a process on this machine, also if it does not ask for it yet.
+    pub(in crate::queue) fn grant_here(&self, worker: &WorkerId, granted: Granted) {
+        let mut workers = self.workers.lock();
+        let known = workers.entry(worker.clone()).or_insert_with(|| {
+            let about = About {
+                name: String::new(),
+                slots: 1,
+                cores: 1,
+                memory_bytes: 0,
+                here: true,
+            };
+            Known::new(about, granted.number)
+        });
+        known.number = granted.number;
+        known.grant(granted);
+    }
+
+    /// The workers elsewhere.
+    fn elsewhere<'a>(
+        &self,
+        workers: &'a BTreeMap<WorkerId, Known>,
+    ) -> impl Iterator<Item = (&'a WorkerId, &'a Known)> {
+        workers.iter().filter(|(_, known)| !known.about.here)
     }
 
     /// Enters a lease, which is then in force.
@@ -371,6 +410,14 @@ impl Leases {
         }
     }
 
+    /// Notes that a worker reports, and what memory it has free then (bytes).
+    pub(in crate::queue) fn has_free(&self, worker: &WorkerId, free_bytes: u64) {
+        if let Some(known) = self.workers.lock().get_mut(worker) {
+            known.heard = Instant::now();
+            known.free_bytes = free_bytes.min(known.about.memory_bytes);
+        }
+    }
+
     /// Takes what a worker reports of one job.
     pub(in crate::queue) async fn take(
         &self,
@@ -378,9 +425,6 @@ impl Leases {
         (job, attempt): (JobId, i32),
         report: JobReport,
     ) -> JobAnswer {
-        if let Some(known) = self.workers.lock().get_mut(worker) {
-            known.heard = Instant::now();
-        }
         match self.lease_of(worker, job, attempt) {
             Ok(lease) => {
                 let (room, nothing) = (self.room.clone(), lease.nothing_taken());

@@ -57,6 +57,7 @@ impl Played<'_> {
                 slots: 1,
                 cores: 1,
                 memory_bytes: self.memory,
+                here: false,
             },
         };
         let granted = self.queue.lease(&self.id, ask, wait).await.unwrap()?;
@@ -152,7 +153,7 @@ fn solved(task: &Task) -> (Vec<Vec<u8>>, End, Packed) {
         bodies: None,
     };
     let (end, result) = solve_leased(task, None, fake::solve, allowance, &mut supervisor);
-    (reports, end, result.unwrap())
+    (reports, end, Packed::new(result.unwrap(), true).unwrap())
 }
 
 #[tokio::test]
@@ -359,7 +360,7 @@ async fn a_worker_that_is_not_to_be_trusted_loses_its_job_and_nothing_is_stored(
         (unending, "an end that is none"),
     ];
     for parts in wrong_results() {
-        let packed = Packed::new(parts).unwrap();
+        let packed = Packed::new(parts, true).unwrap();
         attempts.push((
             with(piece_of(&packed, 0, usize::MAX >> 1)),
             "a result that is refused",
@@ -496,6 +497,7 @@ async fn a_worker_keeps_its_room_for_the_job_whose_turn_it_is() {
             slots: 2,
             cores: 2,
             memory_bytes: whole,
+            here: false,
         },
     };
     let nothing = rig

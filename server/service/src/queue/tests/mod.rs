@@ -9,7 +9,6 @@ mod failpoints;
 mod leases;
 mod memory;
 mod order;
-mod processes;
 mod submits;
 
 use std::{
