@@ -697,6 +697,36 @@ async fn a_canceled_sweep_keeps_its_rows_and_a_deleted_one_is_gone() {
     assert_eq!(server.until_done(&next).await["status"], "succeeded");
 }
 
+/// Members that share a body are divided among the workers, and have the same bits as from one of them.
+#[tokio::test]
+async fn a_large_sweep_is_divided_among_workers_and_has_the_same_rows() {
+    let linspace =
+        |start: f64, stop: f64, count: u32| json!({ "start": start, "stop": stop, "count": count });
+    let sweep = json!({
+        "base": example_json("rectangular_punch"),
+        "axes": [
+            { "path": MU, "linspace": linspace(0.05, 0.6, 25) },
+            { "path": RHO, "linspace": linspace(0.01, 0.03, 40) },
+        ],
+    });
+    let mut found = vec![];
+    for (workers, pieces) in [("1", 1), ("2", 2)] {
+        let server = Server::start_alone(SIGNORINI, &["--workers", workers]).await;
+        let id = id(&post(&server, &sweep).await);
+        let done = until_done(&server, &id).await;
+        assert_eq!(
+            (&done["status"], &done["jobs"]),
+            (&json!("succeeded"), &json!(pieces))
+        );
+        found.push(rows(&server, &id).await);
+    }
+    assert_eq!(found[0].len(), 1000);
+    // the 13 lines of the first piece, whose length is 40, end at a member that starts from another line
+    for (alone, divided) in found[0].iter().zip(&found[1]) {
+        assert_eq!(alone, divided);
+    }
+}
+
 /// Operations: WatchSweep
 #[tokio::test]
 async fn a_restart_in_the_middle_repeats_no_member_and_no_event() {

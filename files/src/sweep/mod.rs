@@ -16,11 +16,13 @@
 //! | checking the members and grouping those that share a body | `check` |
 //! | members that differ in numbers only | `numbers` |
 //! | the member that a member starts from | `neighbours` |
+//! | members that share a body, divided among workers | `pieces` |
 
 mod check;
 mod neighbours;
 mod numbers;
 mod path;
+mod pieces;
 mod plan;
 mod read;
 mod template;

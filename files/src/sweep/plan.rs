@@ -47,6 +47,9 @@ pub struct Plan {
     pub(super) with_mesh: bool,
     pub(super) paths: Vec<String>,
     pub(super) values: Values,
+    /// The groups of members that share a body and were divided into pieces, each in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) divided: Vec<Vec<usize>>,
 }
 
 /// The values of all members as JSON.

@@ -71,6 +71,7 @@ pub fn read(text: &str, variation: Variation) -> Result<Sweep, Vec<Violation>> {
         with_mesh,
         paths: paths.into_iter().map(|path| path.text).collect(),
         values,
+        divided: vec![],
     };
     let (count, bytes) = (plan.count(), plan.bytes());
     let (at, list) = match mode {

@@ -499,6 +499,27 @@ fn a_member_of_a_grid_begins_from_one_that_differs_by_one_place_of_one_axis() {
     assert_eq!([1, 64, 65, 128].map(from), [0, 0, 64, 0].map(Some));
 }
 
+#[test]
+fn members_that_share_a_body_are_divided_where_a_line_begins_and_the_plan_knows_their_group() {
+    let definition = json!({"base": base(), "axes": [
+        {"path": MU, "linspace": {"start": 0.1, "stop": 0.5, "count": 41}},
+        {"path": RHO, "linspace": {"start": 0.01, "stop": 0.03, "count": 40}},
+    ]});
+    let mut plan = reading(&definition).unwrap().plan;
+    let group: Group = (0..1640).collect();
+    let small: Group = vec![7];
+    let pieces = plan.divide(vec![small.clone(), group.clone()], 20);
+    // 1640 are three times 500, and the thirds are in the middle of lines of 40
+    let ends = pieces.iter().map(|piece| (piece[0], piece.len()));
+    let ends: Vec<(usize, usize)> = ends.collect();
+    assert_eq!(ends, [(7, 1), (0, 560), (560, 560), (1120, 520)]);
+    assert_eq!(plan.divided(1120), Some(&group));
+    let read: Plan = serde_json::from_str(&serde_json::to_string(&plan).unwrap()).unwrap();
+    assert_eq!(read, plan);
+    assert_eq!(read.divided(5000), None);
+    assert_eq!(plan.divide(vec![group.clone()], 0), [group]);
+}
+
 /// A pointer of megabytes with millions of names is refused by its length before it is divided into them.
 #[test]
 fn a_pointer_of_megabytes_is_refused_by_its_length() {

@@ -13,7 +13,7 @@ use super::{
     uploads::{Upload, Uploads},
 };
 use crate::{
-    config::Config,
+    config::{Config, Placing},
     error::{ApiError, Quota, QuotaOf},
     queue::Queue,
     rates::Rates,
@@ -112,6 +112,19 @@ impl Service {
     pub(super) fn largest_job_bytes(&self) -> u64 {
         let budget = self.config.memory.bytes();
         budget.max(self.store.budget().elsewhere())
+    }
+
+    /// How many jobs may be solved at the same time, also by workers that may be started.
+    pub(super) fn most_slots(&self) -> usize {
+        let settings = &self.config.placement;
+        let pilots = match settings.slurm {
+            Placing::Auto => {
+                usize::from(settings.slurm_pilots) * usize::from(settings.slurm_slots.unwrap_or(1))
+            }
+            Placing::Off => 0,
+        };
+        let there = self.queue.state().workers as usize;
+        there.max(usize::from(self.config.workers) + pilots)
     }
 
     /// How many jobs of one owner may wait; `None`: no separate limit, because a service without authentication has

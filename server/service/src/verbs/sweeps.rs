@@ -232,7 +232,8 @@ async fn admitted(
     mut found: Findings,
 ) -> Result<(Vec<NewJob>, NewSweep), ApiError> {
     let id = SweepId::new();
-    let Definition { base, plan } = definition;
+    let Definition { base, mut plan } = definition;
+    let slots = service.most_slots();
     let mesh_size = match base.mesh.stored() {
         Some(hash) => service
             .store
@@ -251,6 +252,7 @@ async fn admitted(
     let made = service.work(move || {
         let mut jobs: Vec<NewJob> = vec![];
         let mut stored = 0;
+        let groups = divided(&mut plan, &base, groups, slots);
         for group in &groups {
             let Some(first) = group.first() else { continue };
             // it was read before
@@ -329,6 +331,19 @@ base_bytes // of the checked base, on the same mesh
             .map_err(ApiError::InvalidProblem)
     });
     made.await?
+}
+
+/// Divides the members of each body among slots, if there are more slots than bodies.
+fn divided(
+    plan: &mut Plan,
+    base: &Problem,
+    groups: Vec<Vec<usize>>,
+    slots: usize,
+) -> Vec<Vec<usize>> {
+    let (bodies, bytes) = (groups.len().max(1), serde_json::to_vec(base));
+    // each piece stores its problem, too
+    let most = MOST_STORED / (bytes.map_or(0, |json| json.len()).max(1) * bodies);
+    plan.divide(groups, most.min(slots / bodies))
 }
 
 /// The result of submitting a sweep, from its jobs.

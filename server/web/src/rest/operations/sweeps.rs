@@ -45,7 +45,7 @@ pub(super) fn operations() -> Vec<Operation> {
     vec![
         post(SUBMIT, "/v1/sweeps", (KEY,), create_sweep)
             .rpcs(&["CreateSweep"])
-            .summary("Submits a sweep: one problem with many values, at most 10,000 members, all or none; members on the same body are solved by one job")
+            .summary("Submits a sweep: one problem with many values, at most 10,000 members, all or none; members on the same body are solved by one job, or by several if there are many")
             .body(json::<SweepSubmission>())
             .example(content::sweep())
             .answers(202, "The accepted sweep", json::<Sweep>())
