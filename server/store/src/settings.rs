@@ -33,6 +33,29 @@ impl Store {
         self.paused.load(Ordering::Relaxed)
     }
 
+    /// The memory of the largest worker elsewhere (bytes), as it was stored last; 0 if there was none.
+    pub async fn workers_memory(self: &Arc<Self>) -> Result<u64> {
+        self.read(|_, connection| {
+            let bytes = "select value from setting where name = 'workers_memory'";
+            let bytes: Option<String> = connection.optional_value(bytes, ())?;
+            Ok(bytes.and_then(|bytes| bytes.parse().ok()).unwrap_or(0))
+        })
+        .await
+    }
+
+    /// Stores the memory of the largest worker elsewhere (bytes).
+    pub async fn set_workers_memory(self: &Arc<Self>, bytes: u64) -> Result<()> {
+        self.control(move |writer| {
+            let tx = writer.begin_control()?;
+            let statement = "insert into setting (name, value) values ('workers_memory', ?)
+                             on conflict do update set value = excluded.value";
+            tx.run(statement, [bytes.to_string()])?;
+            tx.commit()?;
+            Ok(())
+        })
+        .await
+    }
+
     /// Pauses or resumes the queue; this is kept across restarts.
     pub async fn set_paused(self: &Arc<Self>, paused: bool) -> Result<()> {
         self.control(move |writer| {

@@ -187,6 +187,9 @@ impl Queue {
     /// Goes on with the jobs that workers elsewhere solve since before the service restarted: each has the time of a lease to
     /// report. Call this before the first report can come.
     pub async fn go_on(self: &Arc<Self>) -> Result<()> {
+        let memory = self.store.workers_memory().await?;
+        self.leases.remember(memory);
+        self.store.budget().set_elsewhere(memory);
         for Leased {
             job,
             lessee,
@@ -239,10 +242,18 @@ impl Queue {
     async fn run_periodic_tasks(self: Arc<Self>) {
         let mut expiring = RepeatedError::new("jobs that waited too long could not be ended");
         let mut requeuing = RepeatedError::new("lost jobs could not be requeued");
+        let mut noting = RepeatedError::new("the memory of workers could not be stored");
+        let mut stored = self.leases.remembered();
         let mut forgetting = RepeatedError::new("ids of deleted jobs could not be removed");
         loop {
             // one that is gone has no room for anybody
-            self.store.budget().set_elsewhere(self.leases.largest());
+            let largest = self.leases.largest();
+            self.store.budget().set_elsewhere(largest);
+            if largest != stored {
+                // after a restart a job that only they have room for waits for them
+                let noted = noting.note(self.store.set_workers_memory(largest).await);
+                stored = noted.map_or(stored, |()| largest);
+            }
             let seen = self.state();
             self.last_hour
                 .see(Time::now(), seen.queued as u64, seen.running as u64);

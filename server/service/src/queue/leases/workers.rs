@@ -41,6 +41,8 @@ pub(in crate::queue) struct Leases {
     room: Arc<Semaphore>,
     /// How long a lease lasts.
     lasts: Mutex<Duration>,
+    /// The memory of the largest worker before the service was restarted (bytes), and until when it counts.
+    before: Mutex<(u64, Instant)>,
 }
 
 impl Default for Leases {
@@ -50,6 +52,7 @@ impl Default for Leases {
             leases: Mutex::default(),
             room: room_for_results(),
             lasts: Mutex::new(LEASE),
+            before: Mutex::new((0, Instant::now())),
         }
     }
 }
@@ -256,12 +259,25 @@ impl Leases {
         states
     }
 
+    /// Remembers the memory of the largest worker before the service was restarted (bytes): workers have the time of a lease to
+    /// call again.
+    pub(in crate::queue) fn remember(&self, bytes: u64) {
+        *self.before.lock() = (bytes, Instant::now() + self.lasts());
+    }
+
+    /// The memory of the largest worker before the service was restarted (bytes).
+    pub(in crate::queue) fn remembered(&self) -> u64 {
+        self.before.lock().0
+    }
+
     /// The memory of the largest worker (bytes); 0 without one.
     pub(in crate::queue) fn largest(&self) -> u64 {
+        let (before, until) = *self.before.lock();
+        let before = if Instant::now() < until { before } else { 0 };
         let workers = self.workers.lock();
         let memory = self.elsewhere(&workers);
         let memory = memory.map(|(_, known)| known.about.memory_bytes);
-        memory.max().unwrap_or(0)
+        memory.max().unwrap_or(0).max(before)
     }
 
     /// Notes a request for a job.

@@ -597,3 +597,36 @@ async fn a_job_whose_worker_does_not_outlive_the_service_is_solved_by_another() 
         subscription.changed().await;
     }
 }
+
+#[tokio::test]
+async fn a_job_that_only_a_worker_has_room_for_waits_for_it_after_a_restart() {
+    let rig = rig_of(fake::solve, 1).await;
+    rig.store.set_budget(Budget::new(10 * MIB, 1, 0));
+    rig.queue.start();
+    let worker = Played::new(&rig, "one");
+    assert!(worker.ask(Duration::ZERO).await.is_none());
+    while rig.store.workers_memory().await.unwrap() != worker.memory {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    rig.queue.drain().await;
+    // as a service that has just started
+    rig.store.budget().set_elsewhere(0);
+    let again = Queue::new(rig.store.clone(), Solver::Threads(fake::solve), 1);
+    again.set_lease(LONG);
+    again.go_on().await.unwrap();
+    again.start();
+    let job = NewJob {
+        memory_bytes: 40 * MIB,
+        ..new(0)
+    };
+    let rig = Rig {
+        queue: again,
+        ..rig
+    };
+    let (large, small) = (rig.submit_as(job).await, rig.submit().await);
+    assert_eq!(rig.until_done(&small).await.status, Status::Succeeded);
+    let waits = rig.store.job(Owners::All, large.id).await.unwrap().unwrap();
+    assert_eq!(waits.status, Status::Queued);
+    let mut worker = Played::new(&rig, "one");
+    assert_eq!(worker.next().await.id, large.id);
+}
