@@ -1,4 +1,4 @@
-"""Promises that tests of the running service show (R32): runs them, and tells how many there were.
+"""Promises that tests of the running service show (R32, R37): runs them, and tells how many there were.
 
     service.py NAME
 """
@@ -13,9 +13,11 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 from outside import TOP, check
 
 # what is told of the tests of these modules
-MODULES = {"auth": ("auth::", "owners::")}
+MODULES = {"auth": ("auth::", "owners::"), "hostile_worker": ("hostile_worker::",)}
 FIGURES = {
     "auth": "every operation with 11 kinds of tokens and none over both protocols; streams, owners, hosts, origins and proxies (%d tests)",
+    "hostile_worker": "a wrong token, jobs of others, old leases, gaps, wrong hashes, results of 10 GiB, numbers that are not finite, nonsense: "
+                      "refused and told, nothing stored, each job solved by another worker (%d tests)",
 }
 
 

@@ -125,4 +125,6 @@ ROWS = [
     Row("R35", "A page in a browser re-attaches after a restart", "page.py", "page.py", needs=("chromium",)),
     Row("R36", "Workers on other machines that are killed or cut off, and a service that is killed under them: no job is lost or ends twice",
         "workers.py", "workers.py --soak"),
+    Row("R37", "Workers that break the contract or speak for others: refused, nothing stored, and told", "service.py hostile_worker",
+        "service.py hostile_worker"),
 ]

@@ -18,6 +18,7 @@ mod every_field;
 mod files;
 mod filters;
 mod grpc;
+mod hostile_worker;
 mod keys;
 mod limits;
 mod list;
