@@ -1,13 +1,17 @@
 //! The outboxes of workers against a queue, under random faults: messages are lost, repeated and late, workers die, the service
 //! restarts. Every job ends once, and has each event of its last attempt once, in order.
 //!
-//! `SIGNORINI_SIMULATION_SEEDS=count` runs so many seeds, `SIGNORINI_SIMULATION_SEED=n` one alone.
+//! `SIGNORINI_SIMULATION_SEED=n` runs that seed alone, `SIGNORINI_SIMULATION_SEEDS=count` the first `count`, and
+//! `SIGNORINI_SIMULATION_FIRST=n` leaves out those before n.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
     path::Path,
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering::Relaxed},
+    },
     time::{Duration, Instant},
 };
 
@@ -27,6 +31,8 @@ use crate::{grpc::workers, pb::worker as pb};
 
 /// How many seeds are run unless the environment says otherwise.
 const SEEDS: u64 = 20;
+/// How many are run at the same time.
+const AT_ONCE: usize = 8;
 const JOBS: usize = 4;
 /// The events of each job.
 const EVENTS: u32 = 12;
@@ -329,16 +335,34 @@ fn every_job_ends_once_with_every_event_once() {
     let number = |name| std::env::var(name).ok().and_then(|text| text.parse().ok());
     let seeds = match number("SIGNORINI_SIMULATION_SEED") {
         Some(seed) => seed..seed + 1,
-        None => 0..number("SIGNORINI_SIMULATION_SEEDS").unwrap_or(SEEDS),
-    };
-    for seed in seeds {
-        let mut runtime = tokio::runtime::Builder::new_current_thread();
-        let runtime = runtime.enable_all().build().unwrap();
-        let run = AssertUnwindSafe(|| runtime.block_on(simulate(seed)));
-        let ran = catch_unwind(run);
-        if let Err(panic) = ran {
-            eprintln!("SIGNORINI_SIMULATION_SEED={seed}");
-            resume_unwind(panic);
+        None => {
+            let first = number("SIGNORINI_SIMULATION_FIRST").unwrap_or(0);
+            first..number("SIGNORINI_SIMULATION_SEEDS").unwrap_or(SEEDS)
         }
+    };
+    // they wait for most of their time
+    let next = AtomicU64::new(seeds.start);
+    std::thread::scope(|scope| {
+        for _ in 0..AT_ONCE {
+            scope.spawn(|| {
+                loop {
+                    let seed = next.fetch_add(1, Relaxed);
+                    if seed >= seeds.end {
+                        return;
+                    }
+                    play(seed);
+                }
+            });
+        }
+    });
+}
+
+fn play(seed: u64) {
+    let mut runtime = tokio::runtime::Builder::new_current_thread();
+    let runtime = runtime.enable_all().build().unwrap();
+    let ran = catch_unwind(AssertUnwindSafe(|| runtime.block_on(simulate(seed))));
+    if let Err(panic) = ran {
+        eprintln!("SIGNORINI_SIMULATION_SEED={seed}");
+        resume_unwind(panic);
     }
 }
