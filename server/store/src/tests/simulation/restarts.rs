@@ -164,13 +164,15 @@ impl World {
             .map(|job| job.key)
             .collect();
         let interrupted = self.store.requeue_interrupted().await.unwrap();
-        let (go_on, over): (BTreeMap<i64, Work>, BTreeMap<i64, Work>) =
+        let (mut go_on, over): (BTreeMap<i64, Work>, BTreeMap<i64, Work>) =
             std::mem::take(&mut self.running)
                 .into_iter()
                 .partition(|(key, work)| work.elsewhere.is_some() && !asked.contains(key));
         assert_eq!(interrupted, over.len());
         self.over
             .extend(over.into_iter().map(|(key, work)| (key, work.attempt)));
+        // a cancel that a full disk has kept from being stored was only in memory
+        go_on.values_mut().for_each(|work| work.canceled = false);
         self.running = go_on;
         self.check_leases().await;
         self.check(true).await;
