@@ -91,7 +91,7 @@ def ran(server, problem, count, slots, processes=()):
 
 def overhead():
     rows = []
-    for name, problem, real in (("solves for some 10 ms, 8 iterations", example(refine=1), True),
+    for name, problem, real in (("solves 224 elements, 8 iterations", example(refine=1), True),
                                 ("waits for 10 ms, 3 iterations", waiting(), False)):
         with Server(*MANY) as server:
             workers = started(BINARY, "worker", "--server", server.url, "--slots", 1) if real else played(server, 1, 0.01)
@@ -99,7 +99,7 @@ def overhead():
                 ran(server, problem, 50, 1)
                 wall, cpu, submitted, theirs = ran(server, problem, 500, 1, [worker])
         rows.append((name, 1e3 * wall / 500, 1e3 * theirs / 500, 1e3 * cpu / 500, 1e3 * submitted / 500))
-    table("A job at one worker elsewhere, ms (500 jobs)", ("the job", "wall", "processor time of the worker", "of the service: lease, "
+    table("A job at one worker elsewhere with one slot, ms (500 jobs)", ("the job", "wall", "processor time of the worker", "of the service: lease, "
           "iterations, result, end", "of the service before: to accept it, in batches of 1000"), rows)
 
 

@@ -53,6 +53,7 @@ const FILES: &[(&str, &[u8])] = files! {
     "contrib/compose.yaml"
     "contrib/nginx.conf"
     "contrib/grafana/signorini.json"
+    "contrib/kubernetes/signorini.yaml"
     "contrib/prometheus/alerts.yml"
     "contrib/systemd/signorini.service"
 };
