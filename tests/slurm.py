@@ -2,15 +2,19 @@
 machine.
 
     slurm.py
+    slurm.py --soak [SEED]
 
 200 jobs and a sweep over pilots have the digests of those that a service solves itself; a pilot that is canceled, one that is
 killed and one whose time is over lose no job; `serve --slurm auto` submits pilots when jobs wait, and none while the controller
-of Slurm is down. The cluster needs root: it has a key, a socket and ports of its own, and touches nothing outside of its folder.
+of Slurm is down. With --soak, 10,000 jobs on eight nodes while nodes, pilots, the service and the controller are killed at
+random. The cluster needs root: it has a key, a socket and ports of its own, and touches nothing outside of its folder.
 """
 
 import contextlib
+import datetime
 import os
 import pathlib
+import random
 import shutil
 import signal
 import socket
@@ -54,7 +58,7 @@ class Cluster:
                  "--pid-file=%s" % (munge / "munged.pid"), "--log-file=%s" % (munge / "log"), "--seed-file=%s" % (munge / "seed"))
         self.start_controller()
         for number in range(1, self.nodes + 1):
-            self.run("slurmd", "-f", self.conf, "-N", "n%d" % number)
+            self.start_node(number)
         until(lambda: self.run("sinfo", "-h", "-N", "-o", "%T").split().count("idle") == self.nodes, 30, "the nodes are idle")
         return self
 
@@ -90,6 +94,21 @@ class Cluster:
 
     def start_controller(self):
         self.run("slurmctld", "-f", self.conf)
+
+    def start_node(self, number):
+        self.run("slurmd", "-f", self.conf, "-N", "n%d" % number)
+
+    def fail_node(self, number):
+        """The daemon of a node dies, and with it what runs there."""
+        self.signal(self.folder / ("run/slurmd-n%d.pid" % number), "KILL")
+        # its pilots are processes of this machine: their names have that of the node
+        self.kill_worker(number)
+
+    def kill_worker(self, number):
+        subprocess.run(["pkill", "-KILL", "--full", "worker --server .* --name n%d:" % number], check=False)
+
+    def kill_controller(self):
+        self.signal(self.folder / "run/slurmctld.pid", "KILL")
 
     def stop_controller(self):
         # one that is killed forgets the last seconds, and takes minutes to learn that a pilot has ended
@@ -251,7 +270,125 @@ def by_itself(cluster):
         until(lambda: not pilots(), 30, "idle pilots end")
 
 
+SOAK_JOBS, NODES, LEASE_S, SOAK_S = 10_000, 8, 5, 300
+
+
+def soak(cluster, dice):
+    """10,000 jobs while everything is killed at random: each ends once, with the digest that it has anywhere."""
+    faults = dict.fromkeys(("pilot killed", "pilot canceled", "node failed", "service killed", "controller killed"), 0)
+    port = outside.free_port()
+    with Service("--workers", "0", "--lease-s", str(LEASE_S), "--max-queued", "100000", "--max-queued-per-owner", "100000", port=port) as server:
+        kinds = [problem(number) for number in range(10)]
+        for number, one in enumerate(kinds):
+            one["mesh"]["refine"] = 2 if number else 4
+        ids = []
+        while len(ids) < SOAK_JOBS:
+            jobs = [{"problem": kinds[number % 10], "cache": "off"} for number in range(500)]
+            answer = server.call("POST", "/v1/jobs/batch", {"jobs": jobs})
+            equal(answer.status, 202, "a batch, %r" % answer)
+            ids += [job["id"] for job in answer.json()["jobs"]]
+        began, failed_nodes, controller = time.monotonic(), {}, None
+        while True:
+            queue = server.json("/v1/queue")
+            if queue["queued"] == queue["running"] == 0:
+                break
+            now = time.monotonic()
+            check(now < began + 3 * SOAK_S, "jobs do not end: %r" % queue)
+            for number, since in list(failed_nodes.items()):
+                if now > since + 20:
+                    cluster.start_node(number)
+                    del failed_nodes[number]
+            if controller and now > controller + 5:
+                cluster.start_controller()
+                controller = None
+            if not controller:
+                refill(server)
+            time.sleep(dice.uniform(1, 4))
+            if now > began + SOAK_S:
+                continue
+            kind = dice.choice(list(faults))
+            if (kind == "controller killed" and controller) or (kind == "pilot canceled" and controller):
+                continue
+            number = dice.randint(1, NODES)
+            if kind == "node failed" and (number in failed_nodes or len(failed_nodes) > 2):
+                continue
+            faults[kind] += 1
+            if kind == "pilot killed":
+                cluster.kill_worker(number)
+            elif kind == "pilot canceled":
+                listed = [line.split() for line in server.pilots() if "RUNNING" in line]
+                if listed:
+                    with contextlib.suppress(AssertionError):  # it has ended meanwhile
+                        cluster.run("scancel", dice.choice(listed)[0])
+            elif kind == "node failed":
+                cluster.fail_node(number)
+                failed_nodes[number] = now
+            elif kind == "service killed":
+                server.kill()
+                server.start()
+            else:
+                cluster.kill_controller()
+                controller = now
+        wall = time.monotonic() - began
+        told = ", ".join("%d × %s" % (count, kind) for kind, count in faults.items())
+        longest, lost = check_soaked(server, kinds, ids)
+        print("figure: %d jobs over %d nodes of Slurm in %.0f s, %s: each ended once, with the same digest; %d lost three workers; after a "
+              "loss a job ran again within %.1f s" % (len(ids), NODES, wall, told, lost, longest))
+        if controller:
+            cluster.start_controller()
+        with contextlib.suppress(AssertionError):
+            server.down()
+
+
+def refill(server):
+    """As many pilots as there are nodes: those that failed are not started again by Slurm."""
+    with contextlib.suppress(AssertionError):  # the controller may be busy
+        missing = NODES - len(server.pilots())
+        if missing > 0:
+            server.up(missing, "--time", "30m")
+
+
+def check_soaked(server, kinds, ids):
+    """The longest time until a job of a lost worker ran again (s), and how many jobs lost three workers."""
+    with Server("--workers", "2") as alone:
+        digests = []
+        for one in kinds:
+            job = alone.submit(one)
+            alone.finished(job)
+            digests.append(alone.json("/v1/jobs/%s/result" % job)["summary"]["digest"])
+    found = {job["id"]: job for job in server.every_job()}
+    equal(len(found), len(ids), "the jobs")
+    longest, lost = 0, 0
+    seconds = lambda text: datetime.datetime.fromisoformat(text.replace("Z", "+00:00")).timestamp()
+    for number, job in enumerate(ids):
+        events = server.events(job)
+        equal([event["seq"] for event in events], list(range(1, len(events) + 1)), "the numbers of " + job)
+        equal([event["type"] for event in events].count("done"), 1, "the ends of " + job)
+        states = [event for event in events if event["type"] == "status"]
+        for event, after in zip(states, states[1:]):
+            if event.get("reason") == "worker_lost" and after["status"] == "running":
+                longest = max(longest, seconds(after["t"]) - seconds(event["t"]))
+        if found[job]["status"] == "failed":
+            equal(found[job]["reason"], "worker_lost", "the failure of " + job)
+            lost += 1
+            continue
+        equal(found[job]["status"], "succeeded", job)
+        # every tenth result: all of them are read by their rows above
+        if number % 10 == number // 10 % 10:
+            digest = server.json("/v1/jobs/%s/result" % job)["summary"]["digest"]
+            equal(digest, digests[number % 10], "the digest of " + job)
+    check(lost <= len(ids) // 1000, "%d jobs lost three workers each" % lost)
+    check(longest < 60, "a job ran again only after %.1f s" % longest)
+    return longest, lost
+
+
 def main():
+    if "--soak" in sys.argv:
+        seed = next((int(word) for word in sys.argv if word.isdigit()), random.randrange(1 << 32))
+        print("seed %d" % seed, flush=True)
+        with Cluster(NODES) as cluster:
+            soak(cluster, random.Random(seed))
+        return
     with Cluster(2) as cluster:
         for part in (compare, lose_pilots, by_itself):
             began = time.monotonic()

@@ -127,4 +127,6 @@ ROWS = [
         "workers.py", "workers.py --soak"),
     Row("R37", "Workers that break the contract or speak for others: refused, nothing stored, and told", "service.py hostile_worker",
         "service.py hostile_worker"),
+    Row("R38", "10,000 jobs on eight nodes of Slurm while pilots, nodes, the service and the controller are killed: each ends once, a lost one "
+        "runs again within a minute", soak="../slurm.py --soak", needs=("slurmctld", "munged")),
 ]

@@ -38,7 +38,8 @@ const JOBS: usize = 4;
 const EVENTS: u32 = 12;
 /// How many faults there are of each kind that costs an attempt: a job fails after three.
 const MOST_DEATHS: u32 = 2;
-const LEASE: Duration = Duration::from_millis(150);
+/// Longer than a busy machine keeps a thread waiting: three leases that end by that would fail a job.
+const LEASE: Duration = Duration::from_secs(1);
 
 struct World {
     dice: Rng,
