@@ -404,7 +404,7 @@ pub enum Waiting {
     WorkersBusy,
     /// A worker is idle, but the running jobs leave too little of the memory budget for the next job.
     Memory,
-    /// No worker that is there has the memory that the job needs.
+    /// No worker that is there has the memory that the job needs, or there is no worker.
     NoWorkerFits,
     /// The queue is paused.
     Paused,

@@ -33,7 +33,7 @@ use super::{
 pub struct MembersTask {
     /// The definition of the sweep.
     pub definition: String,
-    /// The number of the job's first member, whose problem is the problem of the job.
+    /// The number of the job's first member.
     pub first: usize,
     /// The numbers of all members of the job, in order.
     pub group: Vec<usize>,

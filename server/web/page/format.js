@@ -145,7 +145,7 @@ export const words = (code) => code.replaceAll("_", " ").replaceAll("-", " ");
 /** @type {Record<string, string>} */
 const WAITING = {
   workers_busy: "all workers are busy",
-  no_worker_fits: "no worker that is there has as much memory",
+  no_worker_fits: "there is no worker, or none with as much memory",
   memory: "the running jobs leave too little memory",
   paused: "the queue is paused",
   low_disk: "the disk is full",

@@ -59,7 +59,7 @@ impl WorkerService for Workers {
             },
         };
         let leased = workers::lease(&self.service, &caller, applicant, wait).await?;
-        let pace = workers::pace(&self.service);
+        let pace = workers::pace(&self.service, self.here);
         Ok(Response::new(pb::LeaseResponse {
             job: leased.map(|granted| pb::LeasedJob {
                 id: granted.job.to_string(),
@@ -87,7 +87,7 @@ impl WorkerService for Workers {
         let answers = workers::report(&self.service, &caller, who, reports?).await?;
         Ok(Response::new(pb::ReportResponse {
             jobs: answers.into_iter().map(written).collect(),
-            pulse_s: workers::pace(&self.service).pulse.as_secs_f64(),
+            pulse_s: workers::pace(&self.service, self.here).pulse.as_secs_f64(),
         }))
     }
 

@@ -189,6 +189,14 @@ impl Outbox {
         }
     }
 
+    /// What has become of the job here, in words.
+    pub(super) fn how_it_went(&self) -> &'static str {
+        match self.given_back.load(Relaxed) {
+            true => "is given back",
+            false => "has ended here",
+        }
+    }
+
     /// The next report, of at most `left` bytes, from which its size is subtracted.
     pub(super) fn report(&self, left: &mut usize) -> pb::JobReport {
         let state = self.state.lock();

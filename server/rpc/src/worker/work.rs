@@ -39,6 +39,8 @@ const STOP_GRACE: Duration = Duration::from_secs(5);
 const FOR_BODIES: u64 = 4;
 /// How many jobs there may be for each slot, with those that have ended and are being stored by the service.
 const JOBS_PER_SLOT: usize = 2;
+/// The largest number of jobs at a time: a report names all of them.
+const MOST_JOBS: usize = 1024;
 /// The memory for the stored forms of meshes that are kept for later jobs (bytes).
 const FOR_MESHES: usize = 256 << 20;
 
@@ -115,7 +117,7 @@ impl Worker {
         let count = usize::from(self.settings.slots);
         let slots = Arc::new(Semaphore::new(count));
         // a slot is free when its solver has ended: the next job is asked for while the service stores the end
-        let places = Arc::new(Semaphore::new(JOBS_PER_SLOT * count));
+        let places = Arc::new(Semaphore::new((JOBS_PER_SLOT * count).min(MOST_JOBS)));
         let (mut number, mut busy) = (0, Instant::now());
         loop {
             let free = async {
@@ -213,9 +215,11 @@ impl Worker {
             .lock()
             .insert((id.clone(), attempt), outbox.clone());
         let task = self.task(&leased).await;
+        // before the next job is asked for
+        let memory = self.budget.reserve(leased.memory_bytes);
         let worker = self.clone();
         tokio::spawn(async move {
-            match (task, worker.budget.reserve(leased.memory_bytes)) {
+            match (task, memory) {
                 (Some(task), Some(memory)) => {
                     worker.solve(&leased, task, (memory, slot), &outbox).await;
                 }
@@ -225,7 +229,7 @@ impl Worker {
             outbox.over.cancelled().await;
             worker.jobs.lock().remove(&(leased.id, leased.attempt));
             drop(place);
-            info!(job.id = %id, attempt, "job {id} has ended here");
+            info!(job.id = %id, attempt, "job {id} {}", outbox.how_it_went());
         });
     }
 
@@ -311,13 +315,17 @@ impl Worker {
                 }
             };
             let (end, result) = solve_leased(&task, mesh, solve, allowance, &mut teller);
-            // given back before the service is told, and before it is asked for another job
-            drop(memory);
-            drop(slot);
+            if share.is_some() {
+                // what the next job needs before it is solved is not in its share
+                let _ = limit_memory(u64::MAX);
+            }
             match teller.stop() && teller.is_given_back() {
                 true => teller.outbox().finish(&End::GivenBack, None),
                 false => teller.outbox().finish(&end, result),
             }
+            // given back before the service is asked for another job
+            drop(memory);
+            drop(slot);
         });
         if solving.await.is_err() {
             outbox.finish(&End::GivenBack, None);
@@ -337,10 +345,12 @@ impl Worker {
             let _ = timeout(TOGETHER, self.news.ended.notified()).await;
             let jobs: Vec<(Key, Arc<Outbox>)> = {
                 let jobs = self.jobs.lock();
+                // the service knows no more of one that is over
                 let jobs = jobs
                     .iter()
-                    .map(|(key, outbox)| (key.clone(), outbox.clone()));
-                jobs.collect()
+                    .filter(|(_, outbox)| !outbox.over.is_cancelled());
+                jobs.map(|(key, outbox)| (key.clone(), outbox.clone()))
+                    .collect()
             };
             if jobs.is_empty() {
                 continue;

@@ -121,9 +121,9 @@ impl Queue {
         self.leases.has_free(worker, free_bytes);
     }
 
-    /// How often workers are to report.
-    pub fn pace(&self) -> Pace {
-        self.leases.pace()
+    /// How often workers are to report: those elsewhere, or the processes on this machine.
+    pub fn pace(&self, here: bool) -> Pace {
+        self.leases.pace(here)
     }
 
     /// Sets how long a lease lasts that is not renewed.

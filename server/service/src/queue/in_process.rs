@@ -39,8 +39,9 @@ pub(super) async fn solve(
     let (solved, is_usable) = tokio::select! {
         biased;
         solved = lease.solve(Some(problem), recorder) => {
-            // one that is silent or breaks the contract is not used again
-            let broken = matches!(solved, Err(NoSolution::Lost(_) | NoSolution::GivenBack));
+            // one that breaks the contract, or was not given its job, is not used again
+            use NoSolution::{GivenBack, Internal, Lost};
+            let broken = matches!(solved, Err(Lost(_) | GivenBack | Internal(_)));
             (solved, !broken)
         }
         cause = process.death(share) => {
@@ -56,6 +57,9 @@ pub(super) async fn solve(
     drop(lease);
     if is_usable {
         processes.keep(process);
+    } else {
+        queue.leases.forget(&process.worker);
+        process.kill().await;
     }
     solved
 }

@@ -18,7 +18,7 @@ use std::{
 use parking_lot::{Mutex, MutexGuard};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tokio::{
-    io::{AsyncBufReadExt, AsyncReadExt, BufReader},
+    io::{AsyncBufReadExt, AsyncReadExt, BufReader, Interest},
     net::UnixStream,
     process::{Child, ChildStderr},
     sync::mpsc,
@@ -129,7 +129,11 @@ impl Processes {
         let stderr = stderr.map(|stderr| tokio::spawn(log_lines(stderr)));
         tokio::select! {
             status = child.wait() => return Err(io::Error::other(how_it_ended(status?))),
-            readable = timeout(LONGEST_START, ours.readable()) => readable??,
+            ready = timeout(LONGEST_START, ours.ready(Interest::READABLE)) => {
+                if ready??.is_read_closed() {
+                    return Err(io::Error::other("it ended before it spoke"));
+                }
+            }
         }
         self.sockets.send(ours).map_err(io::Error::other)?;
         Ok(Process {
@@ -159,6 +163,11 @@ pub(super) struct Process {
 }
 
 impl Process {
+    /// Kills the process, and waits until it has given back its memory.
+    pub(super) async fn kill(mut self) {
+        let _ = self.child.kill().await; // fails if it is dead already
+    }
+
     /// Waits until the process has died while it solved a job with this share of the memory (bytes); returns why.
     pub(super) async fn death(&mut self, share: u64) -> NoSolution {
         let status = self.child.wait().await;
@@ -212,7 +221,7 @@ fn how_it_ended(status: ExitStatus) -> String {
     }
 }
 
-/// Makes the system refuse this process memory beyond the share of its job (bytes).
+/// Makes the system refuse this process memory beyond the share of its job (bytes); `u64::MAX` between jobs.
 ///
 /// # Errors
 ///

@@ -325,7 +325,8 @@ fn solve_others(
     let plan: Plan = serde_json::from_str(definition).map_err(|_| SolveError::OtherBody)?;
     // other jobs may solve the rest of it
     let group = plan.divided(*number).unwrap_or(group);
-    let is_whole = group.first() == Some(number);
+    // the problem of the job is that of the first of them, so that all pieces have the same body and end alike
+    let is_first = group.first() == Some(number);
     let external = |problem: &Problem| files::external_mesh(problem, mesh.clone());
     let prepare = |problem: &Problem, external: Option<External>, observer: &mut dyn Observer| {
         prepare(problem, external, bodies, meter, observer)
@@ -334,11 +335,10 @@ fn solve_others(
     let mut members = Members::new(&plan, group, mesh, &external, &prepare, family);
     (metered.run, metered.verifying) = (None, false);
     let mut worst = first.verdict;
-    // a member that starts from another one has other bits when it is solved alone
-    if is_whole && numbers.contains(number) {
+    if is_first && numbers.contains(number) {
         metered.member(first)?;
     }
-    for other in numbers.iter().filter(|n| !is_whole || *n != number) {
+    for other in numbers.iter().filter(|n| !is_first || *n != number) {
         let row = members.row(*other, metered)?;
         worst = worst.max(row.verdict);
         metered.member(row)?;

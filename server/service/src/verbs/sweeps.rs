@@ -255,6 +255,7 @@ async fn admitted(
         let groups = divided(&mut plan, &base, groups, slots);
         for group in &groups {
             let Some(first) = group.first() else { continue };
+            let Some(first) = plan.divided(*first).unwrap_or(group).first() else { continue };
             // it was read before
             let Ok(mut problem) = plan.whole_problem(*first, &base.mesh) else { continue };
             let title = problem.title.take();
@@ -342,7 +343,7 @@ fn divided(
 ) -> Vec<Vec<usize>> {
     let (bodies, bytes) = (groups.len().max(1), serde_json::to_vec(base));
     // each piece stores its problem, too
-    let most = MOST_STORED / (bytes.map_or(0, |json| json.len()).max(1) * bodies);
+    let most = MOST_STORED / 2 / (bytes.map_or(0, |json| json.len()).max(1) * bodies);
     plan.divide(groups, most.min(slots / bodies))
 }
 

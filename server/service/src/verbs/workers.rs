@@ -77,9 +77,9 @@ pub async fn lease(
     Ok(leased)
 }
 
-/// How often workers are to report.
-pub fn pace(service: &Service) -> Pace {
-    service.queue.pace()
+/// How often workers are to report: those elsewhere, or the processes on this machine.
+pub fn pace(service: &Service, here: bool) -> Pace {
+    service.queue.pace(here)
 }
 
 /// The name of a worker that may take jobs; an error says everything that speaks against it.

@@ -40,6 +40,8 @@ const UNTIL_STORED: Duration = Duration::from_millis(250);
 const MOST_REPORTS: u64 = 5_000_000;
 /// The largest result of a job of unknown memory (bytes).
 const LARGEST_OF_UNKNOWN: u64 = 1 << 30;
+/// The largest result that is read without a thread of its own (bytes).
+const LARGEST_AT_ONCE: usize = 1 << 20;
 /// A result may be larger than what its job may use by this much: texts around numbers.
 const RESULT_MARGIN: u64 = 16 << 20;
 /// The memory of all results that are arriving together (KiB).
@@ -184,8 +186,11 @@ impl Lease {
         }
     }
 
-    /// Waits until the lease has not been renewed in time.
+    /// Waits until the lease has not been renewed in time; of a process on this machine the system tells when it dies.
     async fn silence(&self) {
+        if self.is_here() {
+            return std::future::pending().await;
+        }
         loop {
             let end = *self.heard.lock() + self.lasts;
             if end <= Instant::now() {
@@ -419,7 +424,11 @@ impl Lease {
         let bytes = std::mem::take(&mut upload.bytes);
         let most = self.largest_result();
         let parts = match here {
-            true => unpack_ours(bytes),
+            true if bytes.len() <= LARGEST_AT_ONCE => unpack_ours(bytes),
+            true => {
+                let read = tasks::blocking(move || unpack_ours(bytes)).await;
+                read.unwrap_or_else(|_| Err("it could not be read".into()))
+            }
             false => {
                 let read = tasks::blocking(move || unpack(bytes, &piece.sha256, most)).await;
                 read.unwrap_or_else(|_| Err("it could not be read".into()))

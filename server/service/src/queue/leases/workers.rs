@@ -13,7 +13,7 @@ use serde::Serialize;
 use store::{Lessee, Room};
 use tokio::{
     sync::{Notify, Semaphore},
-    time::Instant,
+    time::{Instant, timeout},
 };
 
 use super::{
@@ -27,6 +27,8 @@ const LEASE: Duration = Duration::from_secs(30);
 const MOST_WORKERS: usize = 10_000;
 /// A worker that has not been heard of for as many leases is forgotten.
 const FORGOTTEN_AFTER: u32 = 20;
+/// How long an answer waits for what was reported; after that the worker asks again.
+const LONGEST_TAKING: Duration = Duration::from_millis(500);
 /// How many reports that only renew leases all workers together may send in a second.
 const PULSES_PER_S: f64 = 250.0;
 /// The shortest and the longest time between two reports of a worker that has a job: a cancel reaches it with the answer.
@@ -207,9 +209,13 @@ impl Leases {
         *self.lasts.lock()
     }
 
-    /// How often workers are to report: less often if there are many.
-    pub(in crate::queue) fn pace(&self) -> Pace {
-        let workers = self.elsewhere(&self.workers.lock()).count() as f64;
+    /// How often workers are to report: those elsewhere less often if there are many, the processes on this machine as often as
+    /// may be.
+    pub(in crate::queue) fn pace(&self, here: bool) -> Pace {
+        let workers = match here {
+            true => 0.0,
+            false => self.elsewhere(&self.workers.lock()).count() as f64,
+        };
         let (shortest, longest) = PULSES;
         let lease = self.lasts();
         let longest = longest.min(lease / 4);
@@ -242,9 +248,10 @@ impl Leases {
         for lease in self.leases.lock().values() {
             *jobs.entry(lease.worker.clone()).or_default() += 1;
         }
-        let workers = self.workers.lock();
+        let (lasts, workers) = (self.lasts(), self.workers.lock());
         let mut states: Vec<WorkerState> = self
             .elsewhere(&workers)
+            .filter(|(id, known)| known.silence() <= lasts || jobs.contains_key(id))
             .map(|(id, known)| WorkerState {
                 id: id.to_string(),
                 name: known.about.name.clone(),
@@ -275,7 +282,9 @@ impl Leases {
         let (before, until) = *self.before.lock();
         let before = if Instant::now() < until { before } else { 0 };
         let workers = self.workers.lock();
-        let memory = self.elsewhere(&workers);
+        let forgotten = self.lasts() * FORGOTTEN_AFTER;
+        let known = self.elsewhere(&workers);
+        let memory = known.filter(|(_, known)| known.silence() <= forgotten);
         let memory = memory.map(|(_, known)| known.about.memory_bytes);
         memory.max().unwrap_or(0).max(before)
     }
@@ -302,6 +311,10 @@ impl Leases {
             return Found::Granted(granted.clone());
         }
         if !ask.takes && matches!(known.bid, Bid::Open) {
+            // it ends: if it has no job, it is gone
+            if !self.has_job(worker) {
+                workers.remove(worker);
+            }
             return Found::Nothing;
         }
         known.free_bytes = ask.free_bytes.min(known.about.memory_bytes);
@@ -311,6 +324,12 @@ impl Leases {
             worker: worker.clone(),
             wake: known.wake.clone(),
         })
+    }
+
+    /// Whether a worker has a job.
+    fn has_job(&self, worker: &WorkerId) -> bool {
+        let leases = self.leases.lock();
+        leases.values().any(|lease| lease.worker == *worker)
     }
 
     /// The job that the last request of a worker has got.
@@ -349,11 +368,11 @@ impl Leases {
         waiting.map(take).collect()
     }
 
-    /// Gives back an offer that was taken, unless it was granted a job.
+    /// Gives back an offer that was taken, unless it was granted a job; of a process on this machine, its job is over.
     pub(in crate::queue) fn give_back(&self, worker: &WorkerId, number: u64) {
         if let Some(known) = self.workers.lock().get_mut(worker)
             && known.number == number
-            && matches!(known.bid, Bid::Taken)
+            && (matches!(known.bid, Bid::Taken) || known.about.here)
         {
             known.bid = Bid::Open;
         }
@@ -383,6 +402,11 @@ impl Leases {
         });
         known.number = granted.number;
         known.grant(granted);
+    }
+
+    /// Forgets a worker.
+    pub(in crate::queue) fn forget(&self, worker: &WorkerId) {
+        self.workers.lock().remove(worker);
     }
 
     /// The workers elsewhere.
@@ -421,7 +445,7 @@ impl Leases {
                 lease.worker
             )),
             None => Err(format!(
-                "attempt {attempt} of {job} is not leased: it has ended, or its lease has"
+                "attempt {attempt} of {job} is not leased any more: the attempt has ended, or its lease was not renewed in time"
             )),
         }
     }
@@ -446,7 +470,11 @@ impl Leases {
                 let (room, nothing) = (self.room.clone(), lease.nothing_taken());
                 // to its end, also if the connection breaks: half of a report must not count as taken
                 let taking = async move { lease.take(report, &room).await };
-                tasks::detached(taking).await.unwrap_or(nothing)
+                // a large result takes a while to check: the other jobs of the worker do not wait for that
+                match timeout(LONGEST_TAKING, tasks::detached(taking)).await {
+                    Ok(taken) => taken.unwrap_or(nothing),
+                    Err(_) => nothing,
+                }
             }
             Err(why) => JobAnswer {
                 over: true,
