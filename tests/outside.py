@@ -262,6 +262,16 @@ class Server:
                 return jobs
 
 
+def table(title, columns, rows):
+    """Prints a table of figures as the documentation has it."""
+    print("\n**%s**\n" % title)
+    print("| %s |" % " | ".join(columns))
+    print("|%s" % ("---|" * len(columns)))
+    for row in rows:
+        print("| %s |" % " | ".join("%.2f" % cell if isinstance(cell, float) else str(cell) for cell in row))
+    sys.stdout.flush()
+
+
 def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

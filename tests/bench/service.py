@@ -31,7 +31,7 @@ sys.path[:0] = [str(TESTS), str(TESTS / "peers")]
 
 import problem as block
 
-from outside import TERMINAL, TOP, Server, check, cpu_s, equal, example, percentile, submission, talkative
+from outside import TERMINAL, TOP, Server, check, cpu_s, equal, example, percentile, submission, table, talkative
 
 ONLY = sys.argv[1] if sys.argv[1:] in (["--isolation"], ["--bodies"], ["--processor"]) else None
 JOBS = int(sys.argv[1]) if len(sys.argv) > 1 and not ONLY else 1_000_000
@@ -56,15 +56,6 @@ def load(server, connections, answers, sent, status):
     found = json.loads(subprocess.run(command, input=sent, stdout=subprocess.PIPE, check=True).stdout)
     equal(found["statuses"], {str(status): answers}, "the answers to %r" % sent[:80])
     return found
-
-
-def table(title, columns, rows):
-    print("\n**%s**\n" % title)
-    print("| %s |" % " | ".join(columns))
-    print("|%s" % ("---|" * len(columns)))
-    for row in rows:
-        print("| %s |" % " | ".join("%.2f" % cell if isinstance(cell, float) else str(cell) for cell in row))
-    sys.stdout.flush()
 
 
 def commits(folder):

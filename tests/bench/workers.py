@@ -17,19 +17,10 @@ import time
 TESTS = pathlib.Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(TESTS)]
 
-from outside import BINARY, TOP, Server, check, cpu_s, equal, example, memory
+from outside import BINARY, TOP, Server, check, cpu_s, equal, example, memory, table
 
 PLAYED = TOP / "target/release/examples/played_workers"
 MANY = ("--workers", "0", "--max-queued", "1000000")
-
-
-def table(title, columns, rows):
-    print("\n**%s**\n" % title)
-    print("| %s |" % " | ".join(columns))
-    print("|%s" % ("---|" * len(columns)))
-    for row in rows:
-        print("| %s |" % " | ".join("%.2f" % cell if isinstance(cell, float) else str(cell) for cell in row))
-    sys.stdout.flush()
 
 
 def waiting():

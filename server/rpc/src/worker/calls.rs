@@ -178,7 +178,8 @@ impl Calls {
         Ok((leased, seconds(answer.pulse_s)))
     }
 
-    /// Reports what is in these outboxes, and how much memory is free (bytes); enters the answers there; returns the longest time until the next report.
+    /// Reports what is in these outboxes, and how much memory is free (bytes), and enters the answers there; returns the longest
+    /// time until the next report.
     pub(super) async fn report(
         &self,
         jobs: &[(Key, Arc<Outbox>)],

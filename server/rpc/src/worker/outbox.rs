@@ -159,9 +159,8 @@ impl Outbox {
         self.room.notify_all();
     }
 
-    /// Enters how the job has ended; the first end counts. This takes a while if there is a result.
-    pub(super) fn finish(&self, end: &End, result: Option<Parts>) {
-        let result = result.and_then(|parts| self.packed(parts));
+    /// Enters how the job has ended; the first end counts.
+    pub(super) fn finish(&self, end: &End, result: Option<Packed>) {
         let mut state = self.state.lock();
         if state.end.is_some() {
             return;
@@ -174,11 +173,6 @@ impl Outbox {
         drop(state);
         self.news.ended.notify_one();
         self.news.any.notify_one();
-    }
-
-    fn packed(&self, parts: Parts) -> Option<Packed> {
-        // these types are always written
-        Packed::new(parts, !self.is_process).ok()
     }
 
     /// The largest piece of a result in a call (bytes).
@@ -338,7 +332,7 @@ impl Supervisor for Teller {
     }
 
     fn partial(&mut self, parts: Parts) {
-        if let Some(result) = self.outbox.packed(parts) {
+        if let Ok(result) = Packed::new(parts, !self.outbox.is_process) {
             self.outbox.state.lock().add(result, true);
             self.outbox.news.any.notify_one();
         }

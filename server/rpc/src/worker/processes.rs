@@ -12,7 +12,7 @@ use base::{
     caller::Owners,
     digest,
     event::{Event, Payload},
-    job::{Cache, Job, Limits, Reason, Status},
+    job::{Job, Reason, Status},
     memory::Budget,
 };
 use clap::Parser as _;
@@ -24,11 +24,14 @@ use service::{
 use solver::{
     error::SolveError, mesh::External, observer::Observer, problem::Problem, solution::Solution,
 };
-use store::{NewJob, QueueLimits, Store, Submission};
+use store::{NewJob, Store};
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
-use super::run_as_process;
+use super::{
+    run_as_process,
+    simulation::{new_job, submission},
+};
 use crate::grpc::serve_processes;
 
 /// The environment variable that makes the test below serve as a worker process.
@@ -128,35 +131,15 @@ fn poison(name: &str) -> NewJob {
     problem["materials"][0]["youngs_modulus"] = place.into();
     let problem: Problem = serde_json::from_value(problem).unwrap();
     NewJob {
-        id: None,
-        name: None,
-        labels: Default::default(),
-        priority: 0,
-        limits: Limits::default(),
-        cache: Cache::Off,
-        parent: None,
-        sweep: None,
-        title: None,
         input_hash: digest::input_hash(&problem).unwrap(),
         problem: serde_json::to_string(&problem).unwrap(),
-        mesh: None,
-        memory_bytes: 1 << 20,
-        payload: "payload".into(),
+        ..new_job()
     }
 }
 
 impl Rig {
     async fn submit(&self, job: NewJob) -> Job {
-        let submission = Submission {
-            owner: "ada".into(),
-            jobs: vec![job],
-            sweep: None,
-            key: None,
-            limits: QueueLimits {
-                queued: 100,
-                queued_of_owner: None,
-            },
-        };
+        let submission = submission(vec![job]);
         self.queue.submit(submission).await.unwrap().jobs.remove(0)
     }
 

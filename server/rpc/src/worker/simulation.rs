@@ -23,7 +23,7 @@ use base::{
     memory::Budget,
 };
 use fastrand::Rng;
-use service::queue::{About, Ask, End, Queue, Solver, Supervisor, WorkerId};
+use service::queue::{About, Ask, End, Packed, Queue, Solver, Supervisor, WorkerId};
 use store::{Ending, NewJob, Parts, QueueLimits, Store, Submission};
 
 use super::outbox::{News, Outbox, Teller};
@@ -79,7 +79,22 @@ impl Worker {
     }
 }
 
-fn new_job() -> NewJob {
+/// All of these jobs, of one owner.
+pub(super) fn submission(jobs: Vec<NewJob>) -> Submission {
+    Submission {
+        owner: "ada".into(),
+        jobs,
+        sweep: None,
+        key: None,
+        limits: QueueLimits {
+            queued: 100,
+            queued_of_owner: None,
+        },
+    }
+}
+
+/// A job of the fake problem.
+pub(super) fn new_job() -> NewJob {
     let problem = fake::problem();
     NewJob {
         id: None,
@@ -197,7 +212,8 @@ impl World {
                 teller.partial(Parts::of_a_summary());
             }
             if held.told == EVENTS {
-                held.outbox.finish(&end(), Some(Parts::of_a_summary()));
+                let result = Packed::new(Parts::of_a_summary(), true).unwrap();
+                held.outbox.finish(&end(), Some(result));
             }
         }
     }
@@ -281,16 +297,7 @@ async fn simulate(seed: u64) {
     };
     let folder = folder.unwrap();
     let mut world = World::new(seed, folder.path()).await;
-    let submission = Submission {
-        owner: "ada".into(),
-        jobs: (0..JOBS).map(|_| new_job()).collect(),
-        sweep: None,
-        key: None,
-        limits: QueueLimits {
-            queued: 100,
-            queued_of_owner: None,
-        },
-    };
+    let submission = submission((0..JOBS).map(|_| new_job()).collect());
     let jobs = world.queue.submit(submission).await.unwrap().jobs;
     for _ in 0..120 {
         world.step().await;

@@ -314,7 +314,8 @@ impl Worker {
                     Allowance { share, bodies }
                 }
             };
-            let (end, result) = solve_leased(&task, mesh, solve, allowance, &mut teller);
+            let (end, result) =
+                solve_leased(&task, mesh, solve, allowance, share.is_none(), &mut teller);
             if share.is_some() {
                 // what the next job needs before it is solved is not in its share
                 let _ = limit_memory(u64::MAX);

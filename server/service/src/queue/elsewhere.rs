@@ -1,4 +1,4 @@
-//! Solves jobs at workers elsewhere: what workers ask of the queue, and one leased attempt.
+//! Solves jobs at workers in other processes, elsewhere or here: what workers ask of the queue, and one leased attempt.
 
 use std::{sync::Arc, time::Duration};
 

@@ -39,7 +39,7 @@ pub(super) async fn solve(
     let (solved, is_usable) = tokio::select! {
         biased;
         solved = lease.solve(Some(problem), recorder) => {
-            // one that breaks the contract, or was not given its job, is not used again
+            // one that breaks the contract, was not given its job, or whose solver has panicked, is not used again
             use NoSolution::{GivenBack, Internal, Lost};
             let broken = matches!(solved, Err(Lost(_) | GivenBack | Internal(_)));
             (solved, !broken)

@@ -423,14 +423,15 @@ impl Lease {
         }
         let bytes = std::mem::take(&mut upload.bytes);
         let most = self.largest_result();
-        let parts = match here {
-            true if bytes.len() <= LARGEST_AT_ONCE => unpack_ours(bytes),
-            true => {
-                let read = tasks::blocking(move || unpack_ours(bytes)).await;
-                read.unwrap_or_else(|_| Err("it could not be read".into()))
-            }
+        let is_quick = here && bytes.len() <= LARGEST_AT_ONCE;
+        let read = move || match here {
+            true => unpack_ours(bytes),
+            false => unpack(bytes, &piece.sha256, most),
+        };
+        let parts = match is_quick {
+            true => read(),
             false => {
-                let read = tasks::blocking(move || unpack(bytes, &piece.sha256, most)).await;
+                let read = tasks::blocking(read).await;
                 read.unwrap_or_else(|_| Err("it could not be read".into()))
             }
         };

@@ -1,4 +1,4 @@
-//! Jobs that workers elsewhere solve.
+//! Jobs that workers in other processes solve: elsewhere, and on this machine.
 //!
 //! A worker asks for a job, and waits until there is one: its request is an offer of a slot, which the dispatcher treats as
 //! it does an idle slot of its own. The job is then leased to the worker for one attempt. The worker reports what its solver

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use base::{memory::Allowance, run::Solve};
 use serde::{Deserialize, Serialize};
-use store::{MembersTask, Parts};
+use store::MembersTask;
 
 use super::{
     super::{
@@ -13,6 +13,7 @@ use super::{
         supervisor::Supervisor,
     },
     messages::End,
+    packed::Packed,
 };
 
 /// What a worker is to solve.
@@ -27,14 +28,15 @@ pub struct Task {
 }
 
 /// Solves a task on this thread, on the stored form of the mesh that its problem names; returns the end of the attempt, and
-/// the result if there is one. Call this on a blocking thread.
+/// the result if there is one, `hashed` or not. Call this on a blocking thread.
 pub fn solve_leased(
     task: &Task,
     mesh: Option<&[u8]>,
     solve: Solve,
     allowance: Allowance<'_>,
+    hashed: bool,
     supervisor: &mut dyn Supervisor,
-) -> (End, Option<Parts>) {
+) -> (End, Option<Packed>) {
     let solving = || {
         let mesh = mesh.map(read_mesh).transpose()?;
         let members = task.members.as_ref();
@@ -50,7 +52,9 @@ pub fn solve_leased(
             unverified,
             iterations,
         };
-        Ok((end, Some(parts)))
+        let packed = Packed::new(parts, hashed);
+        let packed = packed.map_err(|error| NoSolution::Internal(error.to_string()))?;
+        Ok((end, Some(packed)))
     };
     // what a panic leaves behind is not used again
     catch_unwind(AssertUnwindSafe(solving))

@@ -152,8 +152,8 @@ fn solved(task: &Task) -> (Vec<Vec<u8>>, End, Packed) {
         share: u64::MAX,
         bodies: None,
     };
-    let (end, result) = solve_leased(task, None, fake::solve, allowance, &mut supervisor);
-    (reports, end, Packed::new(result.unwrap(), true).unwrap())
+    let (end, result) = solve_leased(task, None, fake::solve, allowance, true, &mut supervisor);
+    (reports, end, result.unwrap())
 }
 
 #[tokio::test]
