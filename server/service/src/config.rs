@@ -4,6 +4,7 @@
 use std::{
     net::{IpAddr, SocketAddr, ToSocketAddrs},
     path::PathBuf,
+    sync::OnceLock,
 };
 
 use axum::http::{HeaderName, Uri};
@@ -642,8 +643,14 @@ impl MemoryBudget {
     }
 }
 
-/// The memory of this machine, or of the container that the process runs in.
+/// The memory of this machine, or of the container that the process runs in, as it was when this was called first: each
+/// submission asks for it.
 fn machine_memory() -> u64 {
+    static BYTES: OnceLock<u64> = OnceLock::new();
+    *BYTES.get_or_init(read_machine_memory)
+}
+
+fn read_machine_memory() -> u64 {
     // If the memory is unknown, problems are not refused for it; 8 GiB is a common small machine.
     const UNKNOWN: u64 = 8 << 30;
     let total = std::fs::read_to_string("/proc/meminfo")

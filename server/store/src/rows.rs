@@ -10,14 +10,14 @@ use base::{
     job::{Failure, Job, JobId, Limits, Reason, ResultAvailable, Status},
     time::Time,
 };
-use rusqlite::{Connection, Row, params, params_from_iter};
+use rusqlite::{Connection, Row, params, params_from_iter, types::FromSql};
 use serde::Serialize;
 use uuid::Uuid;
 
 use super::{
     checksum::{self, Value},
     error::{Record, Result, StoreError},
-    sql::{Sql, optional_text, text},
+    sql::Sql,
 };
 
 /// All data of a row: the job as clients see it, and what only the store needs.
@@ -133,7 +133,7 @@ fn checked(row: &Row<'_>) -> Result<(JobRow, Vec<Value>)> {
     let read = || {
         let values = checksum::values(row)?;
         match row.get::<_, Option<i64>>("checksum")? {
-            Some(sum) if sum == checksum::of_values(&values) => Ok((parse(row)?, values)),
+            Some(sum) if sum == checksum::of_values(&values) => Ok((parse(&values)?, values)),
             _ => Err(corrupt("checksum")),
         }
     };
@@ -144,20 +144,90 @@ fn checked(row: &Row<'_>) -> Result<(JobRow, Vec<Value>)> {
     read().map_err(|error: StoreError| error.reading(record))
 }
 
-fn parse(row: &Row<'_>) -> Result<JobRow> {
-    let uuid = text(row, "uuid")?;
-    let reason = optional_text(row, "reason")?;
-    let time = |name: &str| -> Result<Option<Time>> {
-        Ok(row.get::<_, Option<i64>>(name)?.map(Time::from_micros))
-    };
-    let progress = optional_text(row, "progress")?;
+/// The columns of the table, in its order, without the checksum. A column that a migration adds is added here and where rows
+/// are read and written.
+const COLUMNS: [&str; 37] = [
+    "id",
+    "uuid",
+    "status",
+    "reason",
+    "cancel_requested",
+    "version",
+    "name",
+    "title",
+    "labels",
+    "owner",
+    "priority",
+    "attempt",
+    "max_attempts",
+    "input_hash",
+    "created_at",
+    "started_at",
+    "finished_at",
+    "progress",
+    "failure",
+    "result_available",
+    "last_seq",
+    "payload",
+    "parent",
+    "pinned",
+    "cache",
+    "cached_from",
+    "memory_bytes",
+    "coalesced_into",
+    "timeout_s",
+    "queue_ttl_s",
+    "expires_at",
+    "solver_version",
+    "sweep",
+    "warnings",
+    "mesh",
+    "verdict",
+    "quantities",
+];
+
+/// The values of a row's columns.
+struct Values<'r>(&'r [Value]);
+
+impl<'r> Values<'r> {
+    /// The value of a column. Its place is looked up here: SQLite compares the names of all columns for each value.
+    fn value(&self, column: &'static str) -> Result<&'r Value> {
+        let place = COLUMNS.iter().position(|name| *name == column);
+        let value = place.and_then(|place| self.0.get(place));
+        value.ok_or_else(|| corrupt(column))
+    }
+
+    fn get<T: FromSql>(&self, column: &'static str) -> Result<T> {
+        Ok(T::column_result(self.value(column)?.into())?)
+    }
+
+    fn text(&self, column: &'static str) -> Result<&'r str> {
+        self.optional_text(column)?.ok_or_else(|| corrupt(column))
+    }
+
+    fn optional_text(&self, column: &'static str) -> Result<Option<&'r str>> {
+        match self.value(column)? {
+            Value::Null => Ok(None),
+            Value::Text(text) => Ok(Some(text)),
+            _ => Err(corrupt(column)),
+        }
+    }
+}
+
+fn parse(values: &[Value]) -> Result<JobRow> {
+    let row = Values(values);
+    let uuid = row.text("uuid")?;
+    let reason = row.optional_text("reason")?;
+    let time =
+        |name| -> Result<Option<Time>> { Ok(row.get::<Option<i64>>(name)?.map(Time::from_micros)) };
+    let progress = row.optional_text("progress")?;
     let memory_bytes: Option<i64> = row.get("memory_bytes")?;
-    let failure = optional_text(row, "failure")?;
-    let warnings = optional_text(row, "warnings")?;
-    let verdict = optional_text(row, "verdict")?;
-    let quantities = optional_text(row, "quantities")?;
-    let other = |name: &str| -> Result<Option<JobId>> {
-        let uuid = optional_text(row, name)?;
+    let failure = row.optional_text("failure")?;
+    let warnings = row.optional_text("warnings")?;
+    let verdict = row.optional_text("verdict")?;
+    let quantities = row.optional_text("quantities")?;
+    let other = |name| -> Result<Option<JobId>> {
+        let uuid = row.optional_text(name)?;
         let read = |text| {
             Uuid::try_parse(text)
                 .map(JobId::from)
@@ -169,14 +239,14 @@ fn parse(row: &Row<'_>) -> Result<JobRow> {
     let job = Job {
         key: row.get("id")?,
         coalesced_into: row.get("coalesced_into")?,
-        cache: word("cache", text(row, "cache")?)?,
+        cache: word("cache", row.text("cache")?)?,
         id: JobId::from(Uuid::try_parse(uuid).map_err(|_| corrupt("uuid"))?),
-        status: word("status", text(row, "status")?)?,
+        status: word("status", row.text("status")?)?,
         reason: reason.map(|text| word("reason", text)).transpose()?,
         cancel_requested: row.get("cancel_requested")?,
         version: row.get("version")?,
         name: row.get("name")?,
-        labels: serde_json::from_str(text(row, "labels")?)?,
+        labels: serde_json::from_str(row.text("labels")?)?,
         owner: row.get("owner")?,
         priority: row.get("priority")?,
         attempt: row.get("attempt")?,
@@ -199,7 +269,7 @@ fn parse(row: &Row<'_>) -> Result<JobRow> {
             r#type: explained_at(&failure.code),
             ..failure
         }),
-        result_available: word("result_available", text(row, "result_available")?)?,
+        result_available: word("result_available", row.text("result_available")?)?,
         verdict: verdict.map(|text| word("verdict", text)).transpose()?,
         quantities: quantities.map_or(Ok(vec![]), serde_json::from_str)?,
         warnings: warnings.map_or(Ok(vec![]), serde_json::from_str)?,
@@ -231,8 +301,7 @@ impl JobRow {
         job.links = links(job);
     }
 
-    /// The names and values of the row's columns, in the order of the table, without the checksum. A column that a
-    /// migration adds is added here and where rows are read.
+    /// The names and values of the row's columns, in the order of the table, without the checksum.
     fn columns(&self) -> Result<(Vec<&'static str>, Vec<Value>)> {
         let job = &self.job;
         let uuid = |id: Option<JobId>| Value::from(id.map(|id| id.0.to_string()));
@@ -367,5 +436,6 @@ mod tests {
         let names = store.read(|_, connection| connection.values::<String>(names, ()));
         let names = names.await.unwrap();
         assert_eq!(names, JobRow::default().columns().unwrap().0);
+        assert_eq!(names, COLUMNS);
     }
 }
