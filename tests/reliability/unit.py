@@ -19,7 +19,8 @@ FIGURES = {
     "failpoints": "every failpoint with a panic and, where there may be one, an error (%d tests): one end for its job, the other "
                   "worker and the next job undisturbed",
     "long_contacts": "contacts of up to 3,001 nodes take between a third of their estimate and all of it (%d test)",
-    "simulation": "%d seeds of clients, workers, crashes, full disks and clocks that are set: no promise broken",
+    "simulation": "%d seeds of clients, workers, leases, crashes, full disks and clocks that are set, and as many of workers elsewhere "
+                  "whose messages are lost, repeated and late while the service restarts: no promise broken",
 }
 
 
