@@ -25,7 +25,6 @@ use base::{
 use fastrand::Rng;
 use service::queue::{About, Ask, End, Packed, Queue, Solver, Supervisor, WorkerId};
 use store::{Ending, NewJob, Parts, QueueLimits, Store, Submission};
-
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
