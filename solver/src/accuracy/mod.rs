@@ -446,7 +446,7 @@ fn weighted_errors_of<const DUALS: usize>(
     let duals = body.displacements_without_loads::<DUALS>(&influences, threads);
     let elements = body.elements(solved.system.model);
     let difference = &solved.reported.difference;
-    let products = difference.products_with_fields(elements, &duals, interrupt)?;
+    let products = difference.products(elements, &duals, threads, interrupt)?;
     Ok(products.into_iter().take(influences.len()).collect())
 }
 

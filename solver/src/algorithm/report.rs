@@ -396,9 +396,9 @@ impl Inside {
         let elements = body.elements(model);
         let inner = model.inner(&system.level);
         let interrupt = &mut *state.questions.interrupt.borrow_mut();
-        let recovered = recover(elements, &displacements, &inner, interrupt)?;
-        let difference = StressDifference::new(elements, &recovered, interrupt)?;
-        let errors = difference.norms(elements, interrupt)?;
+        let threads = system.threads;
+        let recovered = recover(elements, &displacements, &inner, threads, interrupt)?;
+        let (difference, errors) = StressDifference::new(elements, &recovered, threads, interrupt)?;
         let inside = Inside {
             displacements,
             recovered,

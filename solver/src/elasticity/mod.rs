@@ -9,6 +9,7 @@
 //! | forces per volume | `body_force` |
 //! | thermal strains | `thermal` |
 //! | integrals shared by elements of one shape | `geometry`, `shapes` |
+//! | work on all elements, on one thread or two | `chunks` |
 //! | elements that do not lock | `mixed` |
 //! | springs between the body and the ground | `springs` |
 //! | stresses, nodal forces and energy | `recovery` |
@@ -17,6 +18,7 @@
 
 mod assembly;
 mod body_force;
+mod chunks;
 mod geometry;
 mod material;
 mod mixed;

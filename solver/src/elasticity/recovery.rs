@@ -1,7 +1,8 @@
 //! From displacements to stresses, nodal forces and energy.
 
 use crate::elasticity::Section;
-use crate::elasticity::geometry::{Elements, MeshStations, Points, Station};
+use crate::elasticity::chunks::CHUNK;
+use crate::elasticity::geometry::{Elements, Points, Station};
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::elasticity::mixed::{Inside, Mixed, OfNodes, dilatation, position};
 use crate::elasticity::thermal::{Inner, ThermalStrain};
@@ -50,11 +51,13 @@ impl Recovered {
 /// Recovers stresses at nodes: taken at the superconvergent points of each element (2 × 2 of a quadrilateral),
 /// extrapolated to its nodes linearly, and averaged over the elements that meet there.
 ///
-/// `inner`: the forces per volume and thermal strains under which the displacements occur.
+/// `inner`: the forces per volume and thermal strains under which the displacements occur; `threads`: the number of threads
+/// that do the work.
 pub fn recover(
     elements: Elements<'_>,
     displacements: &[[f64; 2]],
     inner: &Inner<'_>,
+    threads: usize,
     interrupt: &mut Interrupt<'_>,
 ) -> Result<Recovered, Stopped> {
     let Elements { mesh, section, .. } = elements;
@@ -70,63 +73,109 @@ pub fn recover(
         element_stress: Vec::new(),
         points: [column(), column()],
         point_stress: std::array::from_fn(|_| column()),
-        dilatation_gap: Vec::new(),
+        dilatation_gap: match section.has_split() {
+            true => column(),
+            false => Vec::new(),
+        },
         internal_force: vec![[0.0; 2]; mesh.nodes.len()],
         strain_energy: 0.0,
         work_on_bubbles: 0.0,
     };
     let mut at_nodes = Vec::with_capacity(mesh.elements.len());
-    let mut stations = elements.stations();
-    for (k, some) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
-        pulp::Arch::new().dispatch(|| {
-            for (i, element) in some.iter().enumerate() {
-                let e = k * ELEMENTS_PER_QUESTION + i;
-                let u = element.gather(|n| displacements[n as usize]);
-                let material = section.material_of(e);
-                if section.split(material).is_some() {
-                    let body = (section, material);
-                    let own = found.add_mixed(mesh, body, (element, &u), quadrature, inner);
-                    at_nodes.push(own);
-                    continue;
+    elements.for_each_chunk(
+        threads,
+        || OfChunk::with_room(points.min(CHUNK * MOST_POINTS)),
+        |own, stations, chunk| {
+            own.clear();
+            pulp::Arch::new().dispatch(|| {
+                for (e, element) in chunk.numbered() {
+                    let u = element.gather(|n| displacements[n as usize]);
+                    let material = section.material_of(e);
+                    if section.split(material).is_some() {
+                        own.add_mixed(mesh, (section, material), (element, &u), quadrature, inner);
+                        continue;
+                    }
+                    let (ux, uy) = (u.map(|u| u[0]), u.map(|u| u[1]));
+                    let moduli = &section.materials()[material];
+                    let thermal = inner.thermal_strain(element, material);
+                    let elastic = |station: &Station| {
+                        let strain = station.strain(&ux, &uy);
+                        let of = thermal.as_ref();
+                        of.map_or(strain, |thermal| thermal.elastic(&strain, &station.shape))
+                    };
+                    let nodes = mesh.element_nodes(element);
+                    own.add(stations.of(e, Points::Rule), &nodes, moduli, elastic);
+                    if section.has_split() {
+                        own.dilatation_gap.resize(own.points[0].len(), 0.0);
+                    }
+                    let mut stresses = [[0.0; COMPONENTS]; 4];
+                    for (own, station) in stresses.iter_mut().zip(stations.of(e, Points::Stress)) {
+                        *own = stress(moduli, &elastic(station));
+                    }
+                    let to_nodes = elements.tables.masters.to_nodes(element.family());
+                    own.at_nodes.push(carried(to_nodes, &stresses));
                 }
-                let (ux, uy) = (u.map(|u| u[0]), u.map(|u| u[1]));
-                let moduli = &section.materials()[material];
-                let thermal = inner.thermal_strain(element, material);
-                let elastic = |station: &Station| {
-                    let strain = station.strain(&ux, &uy);
-                    let of = thermal.as_ref();
-                    of.map_or(strain, |thermal| thermal.elastic(&strain, &station.shape))
-                };
-                let rule = stations.of(e, Points::Rule);
-                found.add(mesh, (element, rule), moduli, elastic);
-                if section.has_split() {
-                    found.dilatation_gap.resize(found.points[0].len(), 0.0);
-                }
-                let mut stresses = [[0.0; COMPONENTS]; 4];
-                for (own, station) in stresses.iter_mut().zip(stations.of(e, Points::Stress)) {
-                    *own = stress(moduli, &elastic(station));
-                }
-                let to_nodes = elements.tables.masters.to_nodes(element.family());
-                at_nodes.push(carried(to_nodes, &stresses));
-            }
-        });
-        interrupt.worked((WORK_OF_AN_ELEMENT * some.len()) as f64)?;
-    }
+            });
+        },
+        |own, chunk| {
+            found.take(own, chunk.elements);
+            at_nodes.extend_from_slice(&own.at_nodes);
+        },
+        interrupt,
+    )?;
     found.average(mesh, section, &at_nodes);
     Ok(found)
 }
 
-impl Recovered {
-    /// Adds the contribution of an element at its integration points; `elastic`: its elastic strain there.
+/// The largest number of integration points of an element.
+pub(super) const MOST_POINTS: usize = 9;
+
+/// What [`recover`] finds in a chunk of elements.
+#[derive(Default)]
+struct OfChunk {
+    points: [Vec<f64>; 2],
+    point_stress: [Vec<f64>; COMPONENTS],
+    dilatation_gap: Vec<f64>,
+    strain_energy: f64,
+    work_on_bubbles: f64,
+    /// By element: the stresses at its nodes, and the forces on them along x and along y.
+    at_nodes: Vec<AtNodes<[f64; COMPONENTS]>>,
+    forces: Vec<[AtNodes<f64>; 2]>,
+}
+
+impl OfChunk {
+    /// Of no elements yet, with room for so many integration points.
+    fn with_room(points: usize) -> Self {
+        let column = || Vec::with_capacity(points);
+        OfChunk {
+            points: [column(), column()],
+            point_stress: std::array::from_fn(|_| column()),
+            dilatation_gap: column(),
+            at_nodes: Vec::with_capacity(CHUNK),
+            forces: Vec::with_capacity(CHUNK),
+            ..OfChunk::default()
+        }
+    }
+
+    fn clear(&mut self) {
+        let columns = self.points.iter_mut().chain(&mut self.point_stress);
+        columns
+            .chain([&mut self.dilatation_gap])
+            .for_each(Vec::clear);
+        self.at_nodes.clear();
+        self.forces.clear();
+        (self.strain_energy, self.work_on_bubbles) = (0.0, 0.0);
+    }
+
+    /// Adds the contribution of an element at its integration points, the stations `rule`; `elastic`: its elastic strain there.
     #[inline(always)]
     fn add(
         &mut self,
-        mesh: &Mesh,
-        (element, rule): (&Element, &[Station]),
+        rule: &[Station],
+        nodes: &AtNodes<[f64; 2]>,
         moduli: &Moduli,
         elastic: impl Fn(&Station) -> [f64; COMPONENTS],
     ) {
-        let nodes = mesh.element_nodes(element);
         let (mut fx, mut fy) = ([0.0; 8], [0.0; 8]);
         for station in rule {
             let strain = elastic(station);
@@ -139,14 +188,10 @@ impl Recovered {
             }
             (0..COMPONENTS).for_each(|c| self.point_stress[c].push(stress[c]));
         }
-        for (i, &node) in element.iter().enumerate() {
-            let force = &mut self.internal_force[node as usize];
-            *force = [force[0] + fx[i], force[1] + fy[i]];
-        }
+        self.forces.push([fx, fy]);
     }
 
-    /// Adds the contribution of a nearly incompressible element at its integration points; returns its stresses at the
-    /// nodes.
+    /// Adds the contribution of a nearly incompressible element, with its stresses at the nodes.
     fn add_mixed(
         &mut self,
         mesh: &Mesh,
@@ -154,24 +199,25 @@ impl Recovered {
         (element, u): (&Element, &AtNodes<[f64; 2]>),
         quadrature: u32,
         inner: &Inner<'_>,
-    ) -> [[f64; COMPONENTS]; 8] {
+    ) {
         let (family, nodes) = (element.family(), mesh.element_nodes(element));
         let deformed = Deformed::new(section, material, (element, &nodes), u, inner);
         self.work_on_bubbles += deformed.work_on_bubble;
+        let mut forces = [[0.0; 8]; 2];
         for point in Mixed::rule(family) {
             let m = family.map(&nodes, point.place);
             let DeformedAt { strain, stress, .. } = deformed.at(&m, point.place);
             let weight = point.weight * m.det * section.depth(m.x);
             self.strain_energy +=
                 0.5 * weight * (0..COMPONENTS).map(|c| stress[c] * strain[c]).sum::<f64>();
-            for (i, &node) in element.iter().enumerate() {
+            for i in 0..8 {
                 let b = section.strain(m.shape[i], m.gradient[i], m.x);
-                for p in 0..2 {
-                    self.internal_force[node as usize][p] +=
-                        weight * (0..COMPONENTS).map(|c| b[c][p] * stress[c]).sum::<f64>();
+                for (p, forces) in forces.iter_mut().enumerate() {
+                    forces[i] += weight * (0..COMPONENTS).map(|c| b[c][p] * stress[c]).sum::<f64>();
                 }
             }
         }
+        self.forces.push(forces);
         for point in family.rule(quadrature) {
             let m = family.map(&nodes, point.place);
             let at = deformed.at(&m, point.place);
@@ -180,7 +226,27 @@ impl Recovered {
             (0..COMPONENTS).for_each(|c| self.point_stress[c].push(at.stress[c]));
             self.dilatation_gap.push(at.dilatation_gap);
         }
-        deformed.at_nodes()
+        self.at_nodes.push(deformed.at_nodes());
+    }
+}
+
+impl Recovered {
+    /// Adds what was found in a chunk of elements, which follow those of the chunks before.
+    fn take(&mut self, found: &OfChunk, elements: &[Element]) {
+        let columns = self.points.iter_mut().chain(&mut self.point_stress);
+        let columns = columns.chain([&mut self.dilatation_gap]);
+        let of_chunk = found.points.iter().chain(&found.point_stress);
+        for (all, own) in columns.zip(of_chunk.chain([&found.dilatation_gap])) {
+            all.extend_from_slice(own);
+        }
+        for (element, [fx, fy]) in elements.iter().zip(&found.forces) {
+            for (i, &node) in element.iter().enumerate() {
+                let force = &mut self.internal_force[node as usize];
+                *force = [force[0] + fx[i], force[1] + fy[i]];
+            }
+        }
+        self.strain_energy += found.strain_energy;
+        self.work_on_bubbles += found.work_on_bubbles;
     }
 
     /// Averages the stresses of the elements at their common nodes.
@@ -224,12 +290,6 @@ fn average(
     sum.iter().zip(&count).map(mean).collect()
 }
 
-/// The number of elements between two calls of the function that may stop the work.
-pub(super) const ELEMENTS_PER_QUESTION: usize = 1 << 14;
-
-/// The work for the stresses of one element, in multiplications.
-pub(super) const WORK_OF_AN_ELEMENT: usize = 3000;
-
 /// The components of the stress in each of several fields.
 pub(super) type Stresses<const FIELDS: usize> = [[f64; FIELDS]; COMPONENTS];
 
@@ -238,8 +298,8 @@ pub(super) type Stresses<const FIELDS: usize> = [[f64; FIELDS]; COMPONENTS];
 pub(super) fn recover_nodal_stresses<const FIELDS: usize>(
     elements: Elements<'_>,
     material: usize,
-    stations: &mut MeshStations<'_>,
     fields: &[[[f64; FIELDS]; 2]],
+    threads: usize,
     interrupt: &mut Interrupt<'_>,
 ) -> Result<Vec<Stresses<FIELDS>>, Stopped> {
     let Elements {
@@ -252,35 +312,44 @@ pub(super) fn recover_nodal_stresses<const FIELDS: usize>(
     let mut count = vec![0u32; mesh.nodes.len()];
     let moduli = &section.materials()[material];
     let split = section.split(material);
-    for (k, elements) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
-        interrupt.ask()?;
-        pulp::Arch::new().dispatch(|| {
-            for (i, element) in elements.iter().enumerate() {
-                let e = k * ELEMENTS_PER_QUESTION + i;
-                if section.material_of(e) != material {
-                    continue;
+    elements.for_each_chunk(
+        threads,
+        || Vec::with_capacity(CHUNK),
+        |found: &mut Vec<_>, stations, chunk| {
+            found.clear();
+            pulp::Arch::new().dispatch(|| {
+                for (e, element) in chunk.numbered() {
+                    if section.material_of(e) != material {
+                        continue;
+                    }
+                    let own = match split {
+                        Some(split) => {
+                            let (family, nodes) = (element.family(), mesh.element_nodes(element));
+                            let body = OfNodes::new(&Mixed::new(section, split, family, &nodes));
+                            mixed_stresses_at_nodes(section, &body, (element, &nodes), fields)
+                        }
+                        None => {
+                            let own = stations.of(e, Points::Stress);
+                            let to_nodes = tables.masters.to_nodes(element.family());
+                            stresses_at_nodes(own, to_nodes, moduli, element, fields)
+                        }
+                    };
+                    found.push((element, own));
                 }
-                element.iter().for_each(|&node| count[node as usize] += 1);
-                let own = match split {
-                    Some(split) => {
-                        let (family, nodes) = (element.family(), mesh.element_nodes(element));
-                        let body = OfNodes::new(&Mixed::new(section, split, family, &nodes));
-                        mixed_stresses_at_nodes(section, &body, (element, &nodes), fields)
-                    }
-                    None => {
-                        let own = stations.of(e, Points::Stress);
-                        let to_nodes = tables.masters.to_nodes(element.family());
-                        stresses_at_nodes(own, to_nodes, moduli, element, fields)
-                    }
-                };
-                for (&node, own) in element.iter().zip(&own) {
+            });
+        },
+        |found, _| {
+            for (element, own) in found {
+                for (&node, own) in element.iter().zip(own) {
+                    count[node as usize] += 1;
                     for (sum, own) in sums[node as usize].iter_mut().zip(own) {
                         (0..FIELDS).for_each(|k| sum[k] += own[k]);
                     }
                 }
             }
-        });
-    }
+        },
+        interrupt,
+    )?;
     for (sum, n) in sums.iter_mut().zip(&count) {
         let scale = f64::from((*n).max(1)).recip();
         sum.iter_mut().flatten().for_each(|v| *v *= scale);

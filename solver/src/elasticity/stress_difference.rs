@@ -4,12 +4,11 @@
 //!
 //!   ‖e‖² = ∫ (σ* − σ) : C⁻¹ (σ* − σ),   σ* = Σ h_i σ_i with the recovered nodal stresses σ_i
 
+use crate::elasticity::chunks::CHUNK;
 use crate::elasticity::geometry::{Elements, Points, Station};
 use crate::elasticity::material::{COMPONENTS, Moduli, inverse, stress};
 use crate::elasticity::mixed::{Mixed, OfNodes, dilatation};
-use crate::elasticity::recovery::{
-    ELEMENTS_PER_QUESTION, Stresses, WORK_OF_AN_ELEMENT, recover_nodal_stresses,
-};
+use crate::elasticity::recovery::{MOST_POINTS, Stresses, recover_nodal_stresses};
 use crate::elasticity::{Recovered, Section};
 use crate::element::{AtNodes, Element, Family, GaussPoint};
 use crate::linear::{Interrupt, Stopped};
@@ -22,118 +21,129 @@ pub struct StressDifference {
 }
 
 impl StressDifference {
-    /// The difference for the stresses `recovered`, which were recovered from the same `elements`.
+    /// The difference for the stresses `recovered`, which were recovered from the same `elements`, and its norm in every
+    /// element ((force × length)^½, without 2π). `threads`: the number of threads that do the work.
     pub fn new(
         elements: Elements<'_>,
         recovered: &Recovered,
+        threads: usize,
         interrupt: &mut Interrupt<'_>,
-    ) -> Result<Self, Stopped> {
-        let (mesh, quadrature) = (elements.mesh, elements.tables.quadrature);
-        let mut differences = Vec::with_capacity(recovered.points[0].len());
+    ) -> Result<(Self, Vec<f64>), Stopped> {
+        let Elements { mesh, section, .. } = elements;
+        let quadrature = elements.tables.quadrature;
+        let count = recovered.points[0].len();
+        let mut differences = Vec::with_capacity(count);
+        let mut norms = Vec::with_capacity(mesh.elements.len());
         let shapes = [Family::Quad, Family::Triangle].map(|family| {
             let points = family.rule(quadrature).iter();
             points
                 .map(|point| family.shape(point.place))
                 .collect::<Vec<_>>()
         });
-        for (k, some) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
-            pulp::Arch::new().dispatch(|| {
-                for (i, element) in some.iter().enumerate() {
-                    let smooth = recovered.at_nodes_of(k * ELEMENTS_PER_QUESTION + i, element);
-                    for shape in &shapes[element.family() as usize] {
-                        let own = recovered.at_point(differences.len());
-                        differences.push(difference(shape, &smooth, &own));
+        let weights = weights(section);
+        let room = count.min(CHUNK * MOST_POINTS);
+        elements.for_each_chunk(
+            threads,
+            || (Vec::with_capacity(room), Vec::with_capacity(CHUNK)),
+            |(differences, norms): &mut (Vec<_>, Vec<f64>), stations, chunk| {
+                differences.clear();
+                norms.clear();
+                pulp::Arch::new().dispatch(|| {
+                    for (e, element) in chunk.numbered() {
+                        let smooth = recovered.at_nodes_of(e, element);
+                        let weights = &weights[section.material_of(e)];
+                        let rule = stations.of(e, Points::Rule);
+                        let mut square = 0.0;
+                        for (shape, station) in shapes[element.family() as usize].iter().zip(rule) {
+                            let point = chunk.first_point + differences.len();
+                            let stress = difference(shape, &smooth, &recovered.at_point(point));
+                            let own = Difference { stress, gap: 0.0 };
+                            square += station.weight * weights.density(&own, &own);
+                            differences.push(stress);
+                        }
+                        norms.push(square.max(0.0).sqrt());
                     }
-                }
-            });
-            interrupt.worked((WORK_OF_AN_ELEMENT * some.len()) as f64)?;
-        }
-        Ok(StressDifference {
+                });
+            },
+            |found, _| {
+                differences.extend_from_slice(&found.0);
+                norms.extend_from_slice(&found.1);
+            },
+            interrupt,
+        )?;
+        let found = StressDifference {
             stress: differences,
             dilatation_gap: recovered.dilatation_gap.clone(),
-        })
+        };
+        Ok((found, norms))
     }
 
-    /// The product ∫ (σ* − σ) : C⁻¹ (σ* − σ)′ in every element, with the difference (σ* − σ)′ of `other` (force ×
-    /// length, without 2π).
+    /// The product ∫ (σ* − σ) : C⁻¹ (σ* − σ)′ in every element (force × length, without 2π) with the differences
+    /// (σ* − σ)′ of several other fields, given by their displacements at the nodes.
     ///
     /// In nearly incompressible elements the stress does not follow from the strain alone, and the product has more
     /// terms: with g = θ̄ − div u and t = tr C⁻¹ (σ* − σ),
     ///
     ///   … + κ (g t′ + t g′) − κ (1 − κ mᵀC⁻¹m) g g′
-    pub fn products(
-        &self,
-        elements: Elements<'_>,
-        other: &StressDifference,
-        interrupt: &mut Interrupt<'_>,
-    ) -> Result<Vec<f64>, Stopped> {
-        integrate(elements, self.points().zip(other.points()), interrupt)
-    }
-
-    /// The differences at all integration points.
-    fn points(&self) -> impl Iterator<Item = Difference> {
-        let gaps = self.dilatation_gap.iter().copied();
-        let gaps = gaps.chain(std::iter::repeat(0.0));
-        let pairs = self.stress.iter().zip(gaps);
-        pairs.map(|(stress, gap)| Difference {
-            stress: *stress,
-            gap,
-        })
-    }
-
-    /// The products of [`StressDifference::products`] with several other fields, given by their displacements at the
-    /// nodes.
     ///
     /// Both σ* and σ of the other fields are linear in the nodal values, so that each element's integral is a sum over
     /// its nodes: the integration points are visited once for all fields.
-    pub fn products_with_fields<const FIELDS: usize>(
+    pub fn products<const FIELDS: usize>(
         &self,
         elements: Elements<'_>,
         fields: &[[[f64; FIELDS]; 2]],
+        threads: usize,
         interrupt: &mut Interrupt<'_>,
     ) -> Result<[Vec<f64>; FIELDS], Stopped> {
+        interrupt.ask()?;
         let Elements { mesh, section, .. } = elements;
         let quadrature = elements.tables.quadrature;
         let mut products = std::array::from_fn(|_| vec![0.0; mesh.elements.len()]);
-        let mut stations = elements.stations();
         for (material, weights) in weights(section).iter().enumerate() {
             let split = section.split(material);
-            let smooth =
-                recover_nodal_stresses(elements, material, &mut stations, fields, interrupt)?;
-            let mut first = 0;
-            for (k, elements) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
-                interrupt.ask()?;
-                pulp::Arch::new().dispatch(|| {
-                    for (i, element) in elements.iter().enumerate() {
-                        let e = k * ELEMENTS_PER_QUESTION + i;
-                        let family = element.family();
-                        let own = first..first + family.rule(quadrature).len();
-                        first = own.end;
-                        if section.material_of(e) != material {
-                            continue;
+            let smooth = recover_nodal_stresses(elements, material, fields, threads, interrupt)?;
+            elements.for_each_chunk(
+                threads,
+                || Vec::with_capacity(CHUNK),
+                |found: &mut Vec<_>, stations, chunk| {
+                    found.clear();
+                    let mut first = chunk.first_point;
+                    pulp::Arch::new().dispatch(|| {
+                        for (e, element) in chunk.numbered() {
+                            let family = element.family();
+                            let own = first..first + family.rule(quadrature).len();
+                            first = own.end;
+                            if section.material_of(e) != material {
+                                continue;
+                            }
+                            let in_common = match split {
+                                None => {
+                                    let own = &self.stress[own];
+                                    let rule = stations.of(e, Points::Rule);
+                                    InCommon::new(rule, own, &weights.compliance)
+                                }
+                                Some(split) => {
+                                    let nodes = mesh.element_nodes(element);
+                                    let body = Mixed::new(section, split, family, &nodes);
+                                    let body = (section, &OfNodes::new(&body));
+                                    let own = own.map(|point| self.point(point));
+                                    let rule = family.rule(quadrature).iter().zip(own);
+                                    InCommon::of_mixed(body, weights, (family, &nodes), rule)
+                                }
+                            };
+                            found.push((e, in_common.with(element, fields, &smooth)));
                         }
-                        let in_common = match split {
-                            None => {
-                                let own = &self.stress[own];
-                                let rule = stations.of(e, Points::Rule);
-                                InCommon::new(rule, own, &weights.compliance)
-                            }
-                            Some(split) => {
-                                let nodes = mesh.element_nodes(element);
-                                let body = Mixed::new(section, split, family, &nodes);
-                                let body = (section, &OfNodes::new(&body));
-                                let own = own.map(|point| self.point(point));
-                                let rule = family.rule(quadrature).iter().zip(own);
-                                InCommon::of_mixed(body, weights, (family, &nodes), rule)
-                            }
-                        };
-                        let product = in_common.with(element, fields, &smooth);
+                    });
+                },
+                |found, _| {
+                    for (e, product) in found {
                         for (products, product) in products.iter_mut().zip(product) {
-                            products[e] = product;
+                            products[*e] = *product;
                         }
                     }
-                });
-            }
+                },
+                interrupt,
+            )?;
         }
         Ok(products)
     }
@@ -143,19 +153,6 @@ impl StressDifference {
             stress: self.stress[point],
             gap: self.dilatation_gap.get(point).copied().unwrap_or(0.0),
         }
-    }
-
-    /// The norm of the difference in every element ((force × length)^½, without 2π).
-    pub fn norms(
-        &self,
-        elements: Elements<'_>,
-        interrupt: &mut Interrupt<'_>,
-    ) -> Result<Vec<f64>, Stopped> {
-        let stress = self.points().map(|point| Difference { gap: 0.0, ..point });
-        let pairs = stress.map(|point| (point, point));
-        let squares = integrate(elements, pairs, interrupt)?;
-        let norm = |square: f64| square.max(0.0).sqrt();
-        Ok(squares.into_iter().map(norm).collect())
     }
 }
 
@@ -237,27 +234,6 @@ impl InCommon {
     }
 }
 
-/// For each element, integrates the product of two differences, given as one pair for each integration point.
-fn integrate(
-    elements: Elements<'_>,
-    mut pairs: impl Iterator<Item = (Difference, Difference)>,
-    interrupt: &mut Interrupt<'_>,
-) -> Result<Vec<f64>, Stopped> {
-    let Elements { mesh, section, .. } = elements;
-    let weights = weights(section);
-    let mut stations = elements.stations();
-    let product = |e: usize| {
-        let weights = &weights[section.material_of(e)];
-        interrupt.worked(WORK_OF_AN_ELEMENT as f64)?;
-        let mut sum = 0.0;
-        for (station, (own, other)) in stations.of(e, Points::Rule).iter().zip(&mut pairs) {
-            sum += station.weight * weights.density(&own, &other);
-        }
-        Ok(sum)
-    };
-    (0..mesh.elements.len()).map(product).collect()
-}
-
 /// The difference σ* − σ = Σ h_i σ_i − σ at a point.
 #[inline(always)]
 fn difference(
@@ -332,7 +308,7 @@ mod tests {
     use crate::elasticity::{ElementTables, recover};
 
     /// Products with fields equal those computed from their recovered stresses, in every kind of analysis, with two
-    /// materials, quadrilaterals and triangles.
+    /// materials, quadrilaterals and triangles; all of it on one thread and on two, with the same bits.
     #[test]
     fn products_of_fields_are_those_of_their_recovered_stresses() {
         for (kind, ratio) in [
@@ -356,7 +332,7 @@ mod tests {
                     "elements": [[0, 1, 4, 3, 6, 7, 8, 9], [1, 2, 5, 10, 11, 12], [1, 5, 4, 12, 13, 7]],
                     "groups": {"left": [0], "right": [1, 2]},
                     "boundaries": {"low": [[0, 1, 6], [1, 2, 10]], "high": [[3, 4, 8], [4, 5, 13]]}
-                }, "refine": 1},
+                }, "refine": 3},
                 "materials": [
                     {"group": "left", "youngs_modulus": 1000, "poissons_ratio": 0.3},
                     {"group": "right", "youngs_modulus": 10, "poissons_ratio": ratio}
@@ -379,25 +355,46 @@ mod tests {
             let interrupt = &mut Interrupt::new(never);
             let inner = model.inner(&crate::model::Level::FULL);
             let difference = |u: &[[f64; 2]], interrupt: &mut Interrupt<'_>| {
-                let recovered = recover(elements, u, &inner, interrupt).unwrap();
-                StressDifference::new(elements, &recovered, interrupt).unwrap()
+                let [one, two] = [1, 2].map(|threads| {
+                    let recovered = recover(elements, u, &inner, threads, interrupt).unwrap();
+                    let found = StressDifference::new(elements, &recovered, threads, interrupt);
+                    let (own, norms) = found.unwrap();
+                    let sums = (recovered.internal_force, recovered.strain_energy);
+                    (own, (recovered.stress, recovered.points, sums, norms))
+                });
+                assert_eq!(one.0.stress, two.0.stress);
+                assert_eq!(one.1, two.1);
+                one.0
+            };
+            let weights = weights(section);
+            let mut stations = elements.stations();
+            let mut product = |e: usize, [a, b]: [&StressDifference; 2]| -> f64 {
+                let points = mesh.elements[..e]
+                    .iter()
+                    .map(|e| e.family().rule(quadrature).len());
+                let rule = stations.of(e, Points::Rule).iter().zip(points.sum()..);
+                let density = |k| weights[section.material_of(e)].density(&a.point(k), &b.point(k));
+                rule.map(|(station, k)| station.weight * density(k)).sum()
             };
             let own = difference(&field(0), interrupt);
             let fields: Vec<_> = (1..=5).map(field).collect();
             let together: Vec<[[f64; 5]; 2]> = (0..mesh.nodes.len())
                 .map(|n| [0, 1].map(|a| std::array::from_fn(|k| fields[k][n][a])))
                 .collect();
-            let found = own.products_with_fields(elements, &together, interrupt);
+            let found = own.products(elements, &together, 1, interrupt);
+            let on_two = own.products(elements, &together, 2, interrupt);
+            assert_eq!(found, on_two);
             for (found, u) in found.unwrap().iter().zip(&fields) {
                 let other = difference(u, interrupt);
-                let expected = own.products(elements, &other, interrupt).unwrap();
+                let expected = (0..mesh.elements.len()).map(|e| product(e, [&own, &other]));
+                let expected: Vec<f64> = expected.collect();
                 let size: f64 = expected.iter().map(|p| p.abs()).sum();
                 for (a, b) in found.iter().zip(&expected) {
                     assert!((a - b).abs() <= 1e-12 * size, "{kind}: {a} for {b}");
                 }
             }
             let stop = &mut || true;
-            let stopped = own.products_with_fields(elements, &together, &mut Interrupt::new(stop));
+            let stopped = own.products(elements, &together, 2, &mut Interrupt::new(stop));
             assert_eq!(stopped, Err(Stopped));
         }
     }

@@ -38,4 +38,5 @@ pub use eliminated::Eliminated;
 pub use fronts::Fronts;
 pub use interrupt::{Interrupt, Stopped};
 pub use multifrontal::{ElementMatrix, Factor, FactorError};
+pub use parallel::for_each_in_order;
 pub use spectrum::{Rows, near_null, quadratic_eigenvalues};

@@ -3,7 +3,7 @@
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::mpsc::sync_channel;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Condvar, Mutex, PoisonError};
 use std::thread;
 
 use super::interrupt::{Interrupt, Stopped};
@@ -88,6 +88,52 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
     }
 }
 
+/// Runs all tasks like [`for_each`], and adds up what they find: `add` gets each workspace after its task, in the order of
+/// the tasks, and one at a time. Sums have the same bits on any number of threads.
+///
+/// What `work` finds is therefore in its workspace. A thread waits for the tasks before its own until they are added: tasks
+/// should be alike, and the work on them longer than adding. `size`: the work on a task, in multiplications.
+pub fn for_each_in_order<T: Send, W: Send>(
+    (tasks, size): (impl Iterator<Item = T> + Send, f64),
+    workspaces: &mut [W],
+    work: impl Fn(&mut W, &T) + Sync,
+    add: impl FnMut(&mut W, T) + Send,
+    interrupt: &mut Interrupt<'_>,
+) -> Result<(), Stopped> {
+    let (turn, changed) = (Mutex::new((0, add)), Condvar::new());
+    let work = |workspace: &mut W, (number, task), interrupt: &mut Interrupt<'_>| {
+        let _passes = PassesOnPanic(|| {
+            turn.lock().unwrap_or_else(PoisonError::into_inner).0 = usize::MAX;
+            changed.notify_all();
+        });
+        work(workspace, &task);
+        // of the tasks that are begun, the first one never waits: it is not stopped before it has added
+        let next = turn.lock().unwrap_or_else(PoisonError::into_inner);
+        let next = changed.wait_while(next, |(next, _)| *next < number);
+        let mut next = next.unwrap_or_else(PoisonError::into_inner);
+        if next.0 > number {
+            return Err(Stopped);
+        }
+        (next.1)(workspace, task);
+        next.0 += 1;
+        drop(next);
+        changed.notify_all();
+        interrupt.worked(size)
+    };
+    for_each(tasks.enumerate(), workspaces, work, interrupt)
+}
+
+/// Lets the other threads pass, and stop, if the thread that holds it panics.
+struct PassesOnPanic<F: Fn()>(F);
+
+impl<F: Fn()> Drop for PassesOnPanic<F> {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            (self.0)();
+        }
+    }
+}
+
 /// Stops the other threads if the thread that holds it panics.
 struct StopOnPanic<'a>([&'a AtomicBool; 2]);
 
@@ -104,6 +150,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::sync::Barrier;
 
+    use super::super::interrupt::PORTION;
     use super::*;
 
     #[derive(Debug, PartialEq)]
@@ -188,6 +235,59 @@ mod tests {
         let mut interrupt = Interrupt::new(&mut stop_at_third);
         let stopped = for_each(0..2, &mut [true, false], work, &mut interrupt);
         assert_eq!((stopped, asked), (Err(Error::Stopped), 3));
+    }
+
+    #[test]
+    fn what_tasks_find_is_added_in_their_order() {
+        for threads in [1, 2, 3] {
+            let mut sum = vec![];
+            let all = Barrier::new(threads);
+            let work = |(found, begun): &mut (usize, bool), task: &usize| {
+                if !std::mem::replace(begun, true) {
+                    all.wait();
+                }
+                // later tasks are done first
+                (0..100 - task).for_each(|_| thread::yield_now());
+                *found = 2 * task;
+            };
+            let add = |(found, _): &mut (usize, bool), task: usize| {
+                assert_eq!(*found, 2 * task);
+                sum.push(task);
+            };
+            let (tasks, workspaces) = ((0..100, 1.0), &mut vec![(0, false); threads]);
+            let mut on = never;
+            let interrupt = &mut Interrupt::new(&mut on);
+            for_each_in_order(tasks, workspaces, work, add, interrupt).unwrap();
+            assert!(sum.into_iter().eq(0..100));
+        }
+        let mut added = 0;
+        let (work, add) = (|(): &mut (), _: &i32| (), |(): &mut (), _: i32| added += 1);
+        let mut stop = || true;
+        let stop = &mut Interrupt::new(&mut stop);
+        assert!(for_each_in_order((0..9, PORTION), &mut [(), ()], work, add, stop).is_err());
+        assert!(added < 9);
+    }
+
+    /// Whichever task the thread that panics has, the other thread ends.
+    #[test]
+    fn a_panic_ends_the_wait_for_the_tasks_before() {
+        for first in [true, false] {
+            let both = Barrier::new(2);
+            let work = |own: &mut bool, _: &i32| {
+                both.wait();
+                assert!(*own != first, "of one thread");
+            };
+            let add = |_: &mut bool, _: i32| ();
+            let mut on = never;
+            let interrupt = &mut Interrupt::new(&mut on);
+            let tasks = (0..2, 1.0);
+            let run = || for_each_in_order(tasks, &mut [true, false], work, add, interrupt);
+            let panic = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run));
+            assert_eq!(
+                *panic.unwrap_err().downcast::<&str>().unwrap(),
+                "of one thread"
+            );
+        }
     }
 
     #[test]
