@@ -14,10 +14,24 @@ use crate::model::{Held, Model};
 /// By node of a mesh, the elements that meet at the node, and the elements around these.
 pub(super) struct Surroundings {
     /// By node: the elements that have the node as a corner.
-    stars: Vec<Vec<u32>>,
+    stars: ByNode,
     /// By node: the elements, mirror images included, that share a corner with an element of the star but are not in
     /// it.
-    rings: Vec<Vec<u32>>,
+    rings: ByNode,
+}
+
+/// A list of elements for each node, all in one.
+struct ByNode {
+    elements: Vec<u32>,
+    /// By node: where its list ends.
+    ends: Vec<usize>,
+}
+
+impl ByNode {
+    fn of(&self, node: usize) -> &[u32] {
+        let start = node.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.elements[start..self.ends[node]]
+    }
 }
 
 /// A set of lines of symmetry, one bit each: for lines across x, and for other lines.
@@ -33,35 +47,58 @@ impl Surroundings {
             let element = &mesh.elements[e as usize];
             &element[..element.family().corners()]
         };
-        let mut stars = vec![Vec::new(); mesh.nodes.len()];
-        for e in 0..mesh.elements.len() as u32 {
-            corners(e)
-                .iter()
-                .for_each(|&node| stars[node as usize].push(e));
+        let all = 0..mesh.elements.len() as u32;
+        let mut ends = vec![0; mesh.nodes.len()];
+        for &node in all.clone().flat_map(corners) {
+            ends[node as usize] += 1;
         }
+        let count = ends.iter_mut().fold(0, |before, end| {
+            *end += before;
+            *end
+        });
+        let mut elements = vec![0; count];
+        // from the last to the first, so that each list is in order, and each end becomes the start
+        for e in all.rev() {
+            for &node in corners(e) {
+                let place = &mut ends[node as usize];
+                *place -= 1;
+                elements[*place] = e;
+            }
+        }
+        ends.rotate_left(1);
+        if let Some(last) = ends.last_mut() {
+            *last = count;
+        }
+        let stars = ByNode { elements, ends };
         let lines = lines_of_symmetry(model);
         // by element and images: the last node in whose star or ring it was put
         let mut met = vec![[u32::MAX; 4]; mesh.elements.len()];
-        // of what meets at a node with its images, one of each is enough: all are there as often
-        let ring = |(node, star): (usize, &Vec<u32>)| {
+        let mut rings = ByNode {
+            elements: Vec::with_capacity(4 * count),
+            ends: Vec::with_capacity(mesh.nodes.len()),
+        };
+        let mut ring: Vec<Imaged> = Vec::new();
+        for (node, of_node) in lines.iter().enumerate() {
+            // of what meets at a node with its images, one of each is enough: all are there as often
             let mut is_new = |(e, images): Imaged| {
                 let met = &mut met[e as usize][usize::from(images)];
                 std::mem::replace(met, node as u32) != node as u32
             };
+            let star = stars.of(node);
             star.iter().for_each(|e| _ = is_new((*e, 0)));
-            let mut ring: Vec<Imaged> = Vec::new();
+            ring.clear();
             for corner in star.iter().flat_map(|e| corners(*e)) {
                 let own = lines[*corner as usize];
                 for images in (0..=own).filter(|images| images & !own == 0) {
-                    let around = stars[*corner as usize].iter();
-                    let around = around.map(|e| (*e, images & !lines[node]));
+                    let around = stars.of(*corner as usize).iter();
+                    let around = around.map(|e| (*e, images & !of_node));
                     ring.extend(around.filter(|imaged| is_new(*imaged)));
                 }
             }
             ring.sort_unstable();
-            ring.into_iter().map(|(e, _)| e).collect()
-        };
-        let rings = stars.iter().enumerate().map(ring).collect();
+            rings.elements.extend(ring.iter().map(|(e, _)| *e));
+            rings.ends.push(rings.elements.len());
+        }
         Surroundings { stars, rings }
     }
 
@@ -74,8 +111,9 @@ impl Surroundings {
             errors.sum()
         };
         let mut parts = vec![0.0f64; errors.len()];
-        for (star, ring) in self.stars.iter().zip(&self.rings) {
-            let (own, around) = (sum(star), sum(ring));
+        for node in 0..self.stars.ends.len() {
+            let star = self.stars.of(node);
+            let (own, around) = (sum(star), sum(self.rings.of(node)));
             if own > around {
                 for e in star {
                     let part = &mut parts[*e as usize];
@@ -89,15 +127,11 @@ impl Surroundings {
     /// By element, whether it is away from the given nodes: it has none of them as a corner, and shares no corner with
     /// an element that does.
     pub(super) fn away_from(&self, nodes: impl Iterator<Item = u32>) -> Vec<bool> {
-        let count = self
-            .stars
-            .iter()
-            .flatten()
-            .max()
-            .map_or(0, |e| *e as usize + 1);
+        let last = self.stars.elements.iter().max();
+        let count = last.map_or(0, |e| *e as usize + 1);
         let mut away = vec![true; count];
         for node in nodes.map(|node| node as usize) {
-            let near = self.stars[node].iter().chain(&self.rings[node]);
+            let near = self.stars.of(node).iter().chain(self.rings.of(node));
             near.for_each(|e| away[*e as usize] = false);
         }
         away

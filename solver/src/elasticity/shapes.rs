@@ -72,7 +72,8 @@ impl Shape {
         for (i, [x, y]) in corners.iter().enumerate() {
             let [next_x, next_y] = corners[(i + 1) % corners.len()];
             area += 0.5 * (x * next_y - next_x * y);
-            let distances = corners.iter().map(|[a, b]| (a - x).hypot(b - y));
+            let others = corners[i + 1..].iter();
+            let distances = others.map(|[a, b]| (a - x).hypot(b - y));
             longest = distances.fold(longest, f64::max);
         }
         area.abs() / longest
