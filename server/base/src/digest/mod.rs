@@ -1,16 +1,16 @@
 //! The fingerprints of a problem (`input_hash`) and of a result (`digest`) are the SHA-256 of canonical JSON (RFC
 //! 8785), so that any client in any language can check them. The fingerprint of a body is used within one process only.
 
+mod lists;
 mod number;
 
 use std::io::{self, Write};
 
-use number::{ROOM, Recent};
+use lists::List;
 use serde::Serialize;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use solver::body::Source;
-use solver::element::Element;
 use solver::model::Model;
 use solver::problem::{InlineMesh, MeshInput, MeshSource, Problem};
 use solver::solution::{self, Fields, GaussFields, Solution, StepSolution};
@@ -41,10 +41,12 @@ pub fn of_body(model: &Model) -> postcard::Result<Key> {
 
 /// Fingerprint of a result: equal digests mean equal bits. Times, the program's version, the statements about accuracy and
 /// the severities of warnings are not included. All numbers must be finite: others have no canonical form. `go_on` is called before every
-/// row and load step; `None` if it returns false.
+/// row and load step, and again and again on the way through the fields; `None` if it returns false. `threads`: the number of threads that
+/// write large fields.
 pub fn digest(
     solution: &Solution,
     input_hash: &str,
+    threads: usize,
     go_on: &mut dyn FnMut() -> bool,
 ) -> serde_json::Result<Option<String>> {
     let mut summary = without_severities(&solution.summary)?;
@@ -55,9 +57,11 @@ pub fn digest(
     // The outermost object and the fields are written by hand, their keys in canonical order: the canonical writer
     // holds every object it is inside of in memory, and fields can be large.
     let mut hash = Hash::new();
-    hash.text_of(r#"{"fields":"#);
-    hash.fields(&solution.fields)?;
-    hash.text_of(r#","history":"#);
+    hash.text_of(r#"{"fields":{"#);
+    if !hash.fields(&solution.fields, threads, go_on)? {
+        return Ok(None);
+    }
+    hash.text_of(r#"},"history":"#);
     if !hash.array(&solution.history, go_on)? {
         return Ok(None);
     }
@@ -105,7 +109,6 @@ struct Hash {
     /// The text that is not hashed yet: the first `length` bytes.
     text: Box<[u8; AT_ONCE]>,
     length: usize,
-    recent: Recent,
 }
 
 impl Hash {
@@ -114,7 +117,6 @@ impl Hash {
             sha256: Sha256::new(),
             text: Box::new([0; AT_ONCE]),
             length: 0,
-            recent: Recent::new(),
         }
     }
 
@@ -134,15 +136,7 @@ impl Hash {
         }
     }
 
-    #[inline]
-    fn byte(&mut self, byte: u8) {
-        self.make_room(1);
-        self.text[self.length] = byte;
-        self.length += 1;
-    }
-
     /// Makes room for `bytes` more bytes; if necessary, hashes the text so far and empties the buffer.
-    #[inline]
     fn make_room(&mut self, bytes: usize) {
         if self.length + bytes > AT_ONCE {
             self.sha256.update(&self.text[..self.length]);
@@ -259,19 +253,14 @@ impl Hash {
         } = inline;
         self.text_of(r#""inline":{"boundaries":"#)
             .json(boundaries)?;
-        self.text_of(r#","elements":"#);
-        self.elements(elements);
+        self.lists(&[(r#","elements":"#, List::Elements(elements))])?;
         if !groups.is_empty() {
             self.text_of(r#","groups":"#).json(groups)?;
         }
         if !node_sets.is_empty() {
             self.text_of(r#","node_sets":"#).json(node_sets)?;
         }
-        self.text_of(r#","nodes":"#);
-        are_finite(nodes.as_flattened())?;
-        self.list(nodes, |hash, place| {
-            hash.list(place, Self::coordinate);
-        });
+        self.lists(&[(r#","nodes":"#, List::Places(nodes))])?;
         if !temperatures.is_empty() {
             self.text_of(r#","temperatures":"#).json(temperatures)?;
         }
@@ -280,7 +269,13 @@ impl Hash {
         Ok(())
     }
 
-    fn fields(&mut self, fields: &Fields) -> serde_json::Result<()> {
+    /// Writes the content of the object of the fields; false if `go_on` returned false.
+    fn fields(
+        &mut self,
+        fields: &Fields,
+        threads: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> serde_json::Result<bool> {
         // all of them by name, so that a new one is not forgotten here
         let Fields {
             contact_state,
@@ -296,13 +291,6 @@ impl Hash {
             x,
             y,
         } = fields;
-        self.text_of(r#"{"contact_state":"#);
-        self.list(contact_state, |hash, state| {
-            hash.coordinate(&f64::from(*state));
-        });
-        self.column(r#","element_error":"#, element_error)?;
-        self.text_of(r#","elements":"#);
-        self.elements(elements);
         let GaussFields {
             order,
             stress_xx: at_points_xx,
@@ -312,75 +300,37 @@ impl Hash {
             x: points_x,
             y: points_y,
         } = gauss;
-        self.text_of(r#","gauss":{"order":"#).json(order)?;
-        self.column(r#","stress_xx":"#, at_points_xx)?;
-        self.column(r#","stress_xy":"#, at_points_xy)?;
-        self.column(r#","stress_yy":"#, at_points_yy)?;
-        self.column(r#","stress_zz":"#, at_points_zz)?;
-        self.coordinates(r#","x":"#, points_x)?;
-        self.coordinates(r#","y":"#, points_y)?;
-        self.column(r#"},"stress_xx":"#, stress_xx)?;
-        self.column(r#","stress_xy":"#, stress_xy)?;
-        self.column(r#","stress_yy":"#, stress_yy)?;
-        self.column(r#","stress_zz":"#, stress_zz)?;
-        self.column(r#","ux":"#, ux)?;
-        self.column(r#","uy":"#, uy)?;
-        self.coordinates(r#","x":"#, x)?;
-        self.coordinates(r#","y":"#, y)?;
-        self.text_of("}");
+        let order = format!(r#","gauss":{{"order":{order},"stress_xx":"#);
+        let (column, coordinates) = (List::Numbers, List::Repeated);
+        let lists = [
+            (r#""contact_state":"#, List::States(contact_state)),
+            (r#","element_error":"#, column(element_error)),
+            (r#","elements":"#, List::Elements(elements)),
+            (order.as_str(), column(at_points_xx)),
+            (r#","stress_xy":"#, column(at_points_xy)),
+            (r#","stress_yy":"#, column(at_points_yy)),
+            (r#","stress_zz":"#, column(at_points_zz)),
+            (r#","x":"#, coordinates(points_x)),
+            (r#","y":"#, coordinates(points_y)),
+            (r#"},"stress_xx":"#, column(stress_xx)),
+            (r#","stress_xy":"#, column(stress_xy)),
+            (r#","stress_yy":"#, column(stress_yy)),
+            (r#","stress_zz":"#, column(stress_zz)),
+            (r#","ux":"#, column(ux)),
+            (r#","uy":"#, column(uy)),
+            (r#","x":"#, coordinates(x)),
+            (r#","y":"#, coordinates(y)),
+        ];
+        are_finite(&lists)?;
+        Ok(lists::write(&lists, threads, go_on, |text| self.bytes(text)).is_ok())
+    }
+
+    /// Writes keys and lists of a mesh.
+    fn lists(&mut self, lists: &[(&str, List<'_>)]) -> serde_json::Result<()> {
+        are_finite(lists)?;
+        // nobody stops this
+        let _ = lists::write(lists, 1, &mut || true, |text| self.bytes(text));
         Ok(())
-    }
-
-    /// Writes a key and its list of numbers in canonical form.
-    fn column(&mut self, key: &str, numbers: &[f64]) -> serde_json::Result<()> {
-        are_finite(numbers)?;
-        self.text_of(key);
-        self.list(numbers, |hash, value| {
-            hash.number(|_, room| number::write(*value, room));
-        });
-        Ok(())
-    }
-
-    /// Writes a key and its list of numbers that repeat often.
-    fn coordinates(&mut self, key: &str, numbers: &[f64]) -> serde_json::Result<()> {
-        are_finite(numbers)?;
-        self.text_of(key);
-        self.list(numbers, Self::coordinate);
-        Ok(())
-    }
-
-    #[inline]
-    fn coordinate(&mut self, value: &f64) {
-        self.number(|recent, room| recent.write(*value, room));
-    }
-
-    fn elements(&mut self, elements: &[Element]) {
-        self.list(elements, |hash, element| {
-            hash.list(element, |hash, node| {
-                hash.number(|_, room| number::write_whole(*node, room));
-            });
-        });
-    }
-
-    /// Writes a number: `write` puts it into the free room, and returns its length.
-    #[inline]
-    fn number(&mut self, write: impl FnOnce(&mut Recent, &mut [u8; ROOM]) -> usize) {
-        self.make_room(ROOM);
-        if let Some(room) = self.text[self.length..].first_chunk_mut() {
-            self.length += write(&mut self.recent, room);
-        }
-    }
-
-    #[inline]
-    fn list<T>(&mut self, items: &[T], write: impl Fn(&mut Self, &T)) {
-        self.byte(b'[');
-        for (k, item) in items.iter().enumerate() {
-            if k > 0 {
-                self.byte(b',');
-            }
-            write(self, item);
-        }
-        self.byte(b']');
     }
 
     fn finish(self) -> String {
@@ -394,8 +344,8 @@ impl Hash {
 }
 
 /// Fails unless all numbers are finite: others have no canonical form.
-fn are_finite(numbers: &[f64]) -> serde_json::Result<()> {
-    match numbers.iter().find(|value| !value.is_finite()) {
+fn are_finite(lists: &[(&str, List<'_>)]) -> serde_json::Result<()> {
+    match lists.iter().find_map(|(_, list)| list.not_finite()) {
         Some(value) => {
             let message = format!("{value} has no canonical form");
             Err(serde::ser::Error::custom(message))
@@ -421,10 +371,14 @@ mod tests {
     use super::*;
 
     fn digest_of(solution: &Solution, input_hash: &str) -> serde_json::Result<String> {
-        Ok(digest(solution, input_hash, &mut || true)?.unwrap())
+        let [one, two] = [1, 2].map(|threads| digest(solution, input_hash, threads, &mut || true));
+        let (one, two) = (one?.unwrap(), two?.unwrap());
+        assert_eq!(one, two);
+        Ok(one)
     }
     use std::collections::BTreeMap;
 
+    use solver::element::Element;
     use solver::problem::{BoundaryPart, Curve, CurveKind, Elasticity, ElementRange};
 
     #[test]

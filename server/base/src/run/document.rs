@@ -79,11 +79,12 @@ pub struct Summary {
 }
 
 impl Document {
-    /// The document of a solution; [`SolveError::Stopped`] if `go_on` returns false.
+    /// The document of a solution, made on `threads` threads; [`SolveError::Stopped`] if `go_on` returns false.
     pub(super) fn new(
         problem: &Problem,
         solution: Solution,
         times: &Times,
+        threads: usize,
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Document, SolveError> {
         let non_finite = SolveError::NonFinite {
@@ -94,7 +95,7 @@ impl Document {
         }
         let non_finite = |_| non_finite.clone();
         let input_hash = digest::input_hash(problem).map_err(non_finite)?;
-        let digest = digest::digest(&solution, &input_hash, go_on).map_err(non_finite)?;
+        let digest = digest::digest(&solution, &input_hash, threads, go_on).map_err(non_finite)?;
         let digest = digest.ok_or(SolveError::Stopped)?;
         let Solution {
             summary,

@@ -35,6 +35,9 @@ const OF_A_PROFILE: usize = 5;
 /// waits for.
 const WRITING: Duration = Duration::from_millis(250);
 
+/// The number of nodes from which a second thread is worth its start: its text takes some 20 ms then.
+const SHARED_DIGEST: usize = 10_000;
+
 /// A function that tells whether to go on writing: it is still true for `WRITING` after `stop` was first true.
 pub fn patient(mut stop: impl FnMut() -> bool) -> impl FnMut() -> bool {
     let mut stopped: Option<Instant> = None;
@@ -101,7 +104,7 @@ impl<'a> Run<'a> {
         // each of these steps says itself that it converged
         so_far.summary.outcome = Outcome::Unfinished;
         so_far.summary.converged = false;
-        Document::new(self.problem, so_far, &times, &mut || true)
+        Document::new(self.problem, so_far, &times, 1, &mut || true)
     }
 
     /// Solves the problem by `solve`, and records the times.
@@ -134,9 +137,13 @@ impl<'a> Run<'a> {
             // within half a second, and writing the fields of a large one takes longer.
             solution.fields = Fields::default();
         }
+        let threads = match solution.fields.x.len() >= SHARED_DIGEST {
+            true => observer.threads(),
+            false => 1,
+        };
         let mut go_on = patient(|| observer.stop());
         let times = watch.borrow_mut().times();
-        Document::new(self.problem, solution, &times, &mut go_on)
+        Document::new(self.problem, solution, &times, threads, &mut go_on)
     }
 }
 
