@@ -3,8 +3,8 @@
 //! as "formulation 4.3".
 //!
 //! A library of pure functions: no clock, file or network; the same problem gives the same bits. A large body is
-//! ordered, factored and its stresses recovered on two threads if the observer lets it ([`observer::Observer::threads`]), with
-//! the same bits as on one.
+//! ordered and factored, its stresses are recovered and its errors stated on two threads if the observer lets it
+//! ([`observer::Observer::threads`]), with the same bits as on one.
 //! Reading and writing of any format is left to the crate `files`. The modules are listed from the ground up; each uses
 //! only the modules above it in the list.
 //!

@@ -23,14 +23,13 @@ pub(super) struct Surroundings {
 /// A list of elements for each node, all in one.
 struct ByNode {
     elements: Vec<u32>,
-    /// By node: where its list ends.
-    ends: Vec<usize>,
+    /// By node: where its list starts; then the end of the last one.
+    starts: Vec<usize>,
 }
 
 impl ByNode {
     fn of(&self, node: usize) -> &[u32] {
-        let start = node.checked_sub(1).map_or(0, |before| self.ends[before]);
-        &self.elements[start..self.ends[node]]
+        &self.elements[self.starts[node]..self.starts[node + 1]]
     }
 }
 
@@ -48,35 +47,34 @@ impl Surroundings {
             &element[..element.family().corners()]
         };
         let all = 0..mesh.elements.len() as u32;
-        let mut ends = vec![0; mesh.nodes.len()];
+        let mut starts = vec![0; mesh.nodes.len()];
         for &node in all.clone().flat_map(corners) {
-            ends[node as usize] += 1;
+            starts[node as usize] += 1;
         }
-        let count = ends.iter_mut().fold(0, |before, end| {
+        // at first the ends
+        let count = starts.iter_mut().fold(0, |before, end| {
             *end += before;
             *end
         });
         let mut elements = vec![0; count];
-        // from the last to the first, so that each list is in order, and each end becomes the start
+        // from the last to the first, so that each list is in order, and each end becomes a start
         for e in all.rev() {
             for &node in corners(e) {
-                let place = &mut ends[node as usize];
+                let place = &mut starts[node as usize];
                 *place -= 1;
                 elements[*place] = e;
             }
         }
-        ends.rotate_left(1);
-        if let Some(last) = ends.last_mut() {
-            *last = count;
-        }
-        let stars = ByNode { elements, ends };
+        starts.push(count);
+        let stars = ByNode { elements, starts };
         let lines = lines_of_symmetry(model);
         // by element and images: the last node in whose star or ring it was put
         let mut met = vec![[u32::MAX; 4]; mesh.elements.len()];
         let mut rings = ByNode {
             elements: Vec::with_capacity(4 * count),
-            ends: Vec::with_capacity(mesh.nodes.len()),
+            starts: Vec::with_capacity(mesh.nodes.len() + 1),
         };
+        rings.starts.push(0);
         let mut ring: Vec<Imaged> = Vec::new();
         for (node, of_node) in lines.iter().enumerate() {
             // of what meets at a node with its images, one of each is enough: all are there as often
@@ -97,7 +95,7 @@ impl Surroundings {
             }
             ring.sort_unstable();
             rings.elements.extend(ring.iter().map(|(e, _)| *e));
-            rings.ends.push(rings.elements.len());
+            rings.starts.push(rings.elements.len());
         }
         Surroundings { stars, rings }
     }
@@ -111,7 +109,7 @@ impl Surroundings {
             errors.sum()
         };
         let mut parts = vec![0.0f64; errors.len()];
-        for node in 0..self.stars.ends.len() {
+        for node in 0..self.stars.starts.len() - 1 {
             let star = self.stars.of(node);
             let (own, around) = (sum(star), sum(self.rings.of(node)));
             if own > around {

@@ -268,6 +268,9 @@ fn add_stiffness(station: &Station, moduli: &Moduli, k: &mut Stiffness) {
     }
 }
 
+/// The largest number of integration points of an element.
+pub(super) const MOST_POINTS: usize = 9;
+
 /// The tables that are computed once for all elements of the same shape.
 pub struct ElementTables {
     /// The number of Gauss points, as in `assemble_element`.
@@ -330,7 +333,7 @@ impl<'a> Elements<'a> {
     pub(super) fn stations(self) -> MeshStations<'a> {
         MeshStations {
             elements: self,
-            own: Vec::new(),
+            own: Vec::with_capacity(MOST_POINTS),
         }
     }
 }

@@ -1,7 +1,6 @@
 //! From displacements to stresses, nodal forces and energy.
 
 use crate::elasticity::Section;
-use crate::elasticity::chunks::CHUNK;
 use crate::elasticity::geometry::{Elements, Points, Station};
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::elasticity::mixed::{Inside, Mixed, OfNodes, dilatation, position};
@@ -84,7 +83,7 @@ pub fn recover(
     let mut at_nodes = Vec::with_capacity(mesh.elements.len());
     elements.for_each_chunk(
         threads,
-        || OfChunk::with_room(points.min(CHUNK * MOST_POINTS)),
+        OfChunk::with_room,
         |own, stations, chunk| {
             own.clear();
             pulp::Arch::new().dispatch(|| {
@@ -127,9 +126,6 @@ pub fn recover(
     Ok(found)
 }
 
-/// The largest number of integration points of an element.
-pub(super) const MOST_POINTS: usize = 9;
-
 /// What [`recover`] finds in a chunk of elements.
 #[derive(Default)]
 struct OfChunk {
@@ -144,15 +140,15 @@ struct OfChunk {
 }
 
 impl OfChunk {
-    /// Of no elements yet, with room for so many integration points.
-    fn with_room(points: usize) -> Self {
+    /// Of no elements yet, with room for so many elements and integration points.
+    fn with_room(elements: usize, points: usize) -> Self {
         let column = || Vec::with_capacity(points);
         OfChunk {
             points: [column(), column()],
             point_stress: std::array::from_fn(|_| column()),
             dilatation_gap: column(),
-            at_nodes: Vec::with_capacity(CHUNK),
-            forces: Vec::with_capacity(CHUNK),
+            at_nodes: Vec::with_capacity(elements),
+            forces: Vec::with_capacity(elements),
             ..OfChunk::default()
         }
     }
@@ -314,7 +310,7 @@ pub(super) fn recover_nodal_stresses<const FIELDS: usize>(
     let split = section.split(material);
     elements.for_each_chunk(
         threads,
-        || Vec::with_capacity(CHUNK),
+        |elements, _| Vec::with_capacity(elements),
         |found: &mut Vec<_>, stations, chunk| {
             found.clear();
             pulp::Arch::new().dispatch(|| {

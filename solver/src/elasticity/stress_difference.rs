@@ -4,11 +4,10 @@
 //!
 //!   ‖e‖² = ∫ (σ* − σ) : C⁻¹ (σ* − σ),   σ* = Σ h_i σ_i with the recovered nodal stresses σ_i
 
-use crate::elasticity::chunks::CHUNK;
 use crate::elasticity::geometry::{Elements, Points, Station};
 use crate::elasticity::material::{COMPONENTS, Moduli, inverse, stress};
 use crate::elasticity::mixed::{Mixed, OfNodes, dilatation};
-use crate::elasticity::recovery::{MOST_POINTS, Stresses, recover_nodal_stresses};
+use crate::elasticity::recovery::{Stresses, recover_nodal_stresses};
 use crate::elasticity::{Recovered, Section};
 use crate::element::{AtNodes, Element, Family, GaussPoint};
 use crate::linear::{Interrupt, Stopped};
@@ -41,10 +40,9 @@ impl StressDifference {
                 .collect::<Vec<_>>()
         });
         let weights = weights(section);
-        let room = count.min(CHUNK * MOST_POINTS);
         elements.for_each_chunk(
             threads,
-            || (Vec::with_capacity(room), Vec::with_capacity(CHUNK)),
+            |elements, points| (Vec::with_capacity(points), Vec::with_capacity(elements)),
             |(differences, norms): &mut (Vec<_>, Vec<f64>), stations, chunk| {
                 differences.clear();
                 norms.clear();
@@ -95,6 +93,7 @@ impl StressDifference {
         threads: usize,
         interrupt: &mut Interrupt<'_>,
     ) -> Result<[Vec<f64>; FIELDS], Stopped> {
+        // the substitutions for the fields could not be stopped
         interrupt.ask()?;
         let Elements { mesh, section, .. } = elements;
         let quadrature = elements.tables.quadrature;
@@ -104,7 +103,7 @@ impl StressDifference {
             let smooth = recover_nodal_stresses(elements, material, fields, threads, interrupt)?;
             elements.for_each_chunk(
                 threads,
-                || Vec::with_capacity(CHUNK),
+                |elements, _| Vec::with_capacity(elements),
                 |found: &mut Vec<_>, stations, chunk| {
                     found.clear();
                     let mut first = chunk.first_point;
