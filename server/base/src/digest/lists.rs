@@ -41,16 +41,17 @@ impl List<'_> {
     }
 }
 
-/// The number of entries of a list that are written at once: 10 to 50 KiB of text.
-const AT_ONCE: usize = 1 << 10;
+/// The number of entries of a list that are written at once: up to 100 KiB of text.
+const PIECE: usize = 1 << 10;
 
-/// The largest text of so many entries.
-const MOST: usize = AT_ONCE * 9 * 12;
+/// The largest text of an entry, an element: eight numbers of ten digits with their commas and brackets, and the free room
+/// that the last one is written to.
+const ENTRY: usize = 8 * 11 + 2 + ROOM;
 
 /// The work on a piece, by which is counted when to ask whether to go on: some ten times in a megabyte of text.
 const WORK_OF_A_PIECE: f64 = 1e7;
 
-/// Writes lists, each with the text before it, on `threads` threads. `take` gets the text piece by piece, in order. An error if
+/// Writes lists, each with the text before it, on `threads` threads, at least one. `take` gets the text piece by piece, in order. An error if
 /// `go_on` returned false.
 pub(super) fn write(
     lists: &[(&str, List<'_>)],
@@ -59,11 +60,11 @@ pub(super) fn write(
     mut take: impl FnMut(&[u8]) + Send,
 ) -> Result<(), Stopped> {
     let pieces = lists.iter().flat_map(|(before, list)| {
-        let starts = (0..list.len().max(1)).step_by(AT_ONCE);
+        let starts = (0..list.len().max(1)).step_by(PIECE);
         starts.map(move |start| (*before, *list, start))
     });
     let most = lists.iter().map(|(_, list)| list.len()).max();
-    let room = most.map_or(0, |most| most.min(AT_ONCE) * (MOST / AT_ONCE));
+    let room = most.map_or(0, |most| most.min(PIECE) * ENTRY);
     let texts = (0..threads).map(|_| Text {
         bytes: Vec::with_capacity(room),
         recent: Recent::new(),
@@ -91,7 +92,7 @@ impl Text {
             self.bytes.extend_from_slice(before.as_bytes());
             self.bytes.push(b'[');
         }
-        let end = list.len().min(start + AT_ONCE);
+        let end = list.len().min(start + PIECE);
         match list {
             List::Numbers(list) => self.entries(start, &list[start..end], |text, value| {
                 text.number(|_, room| number::write(*value, room));
@@ -121,8 +122,8 @@ impl Text {
     /// Writes entries; the first one has the number `start` in its list.
     #[inline]
     fn entries<T>(&mut self, start: usize, entries: &[T], write: impl Fn(&mut Self, &T)) {
-        for (number, entry) in (start..).zip(entries) {
-            if number > 0 {
+        for (k, entry) in (start..).zip(entries) {
+            if k > 0 {
                 self.bytes.push(b',');
             }
             write(self, entry);

@@ -42,7 +42,7 @@ pub fn of_body(model: &Model) -> postcard::Result<Key> {
 /// Fingerprint of a result: equal digests mean equal bits. Times, the program's version, the statements about accuracy and
 /// the severities of warnings are not included. All numbers must be finite: others have no canonical form. `go_on` is called before every
 /// row and load step, and again and again on the way through the fields; `None` if it returns false. `threads`: the number of threads that
-/// write large fields.
+/// write the fields.
 pub fn digest(
     solution: &Solution,
     input_hash: &str,
@@ -425,6 +425,17 @@ mod tests {
     }
 
     #[test]
+    fn writing_the_fields_can_be_stopped() {
+        let mut solution = fake::solution();
+        solution.history.clear();
+        solution.steps.clear();
+        for threads in [1, 2] {
+            let digest = digest(&solution, "h", threads, &mut || false);
+            assert_eq!(digest.unwrap(), None);
+        }
+    }
+
+    #[test]
     fn a_digest_is_the_hash_of_one_canonical_document() {
         let mut solution = fake::solution();
         solution.summary.warnings = vec![solution::Warning {
@@ -440,10 +451,14 @@ mod tests {
             node_profiles: solution.node_profiles.clone(),
             friction_profiles: solution.friction_profiles.clone(),
         });
-        solution.fields.elements = vec![
+        let elements = [
             Element::Quad([0, 1, 2, 3, 4, 5, 6, 4_294_967_295]),
             Element::Triangle([10, 9, 8, 7, 6, 5]),
         ];
+        // as many as are written at once, some whole times and with a rest
+        solution.fields.elements = elements.repeat(513);
+        solution.fields.contact_state = [0, 1, -1, 2].repeat(512);
+        solution.fields.gauss.x = vec![0.25; 1025];
         // more numbers than are hashed at once, of every form that a number can have
         let forms = [
             0.0,

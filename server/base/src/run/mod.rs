@@ -35,7 +35,7 @@ const OF_A_PROFILE: usize = 5;
 /// waits for.
 const WRITING: Duration = Duration::from_millis(250);
 
-/// The number of nodes from which a second thread is worth its start: its text takes some 20 ms then.
+/// The number of nodes from which a second thread is worth its start: one thread takes some 20 ms for the text of the digest then.
 const SHARED_DIGEST: usize = 10_000;
 
 /// A function that tells whether to go on writing: it is still true for `WRITING` after `stop` was first true.
@@ -138,7 +138,7 @@ impl<'a> Run<'a> {
             solution.fields = Fields::default();
         }
         let threads = match solution.fields.x.len() >= SHARED_DIGEST {
-            true => observer.threads(),
+            true => observer.threads().clamp(1, 2),
             false => 1,
         };
         let mut go_on = patient(|| observer.stop());
