@@ -222,7 +222,8 @@ impl Output {
         look: Look,
         document: &Document,
     ) -> anyhow::Result<()> {
-        let mut out = BufWriter::new(out);
+        // many small pieces of a large file would take the system twice the time
+        let mut out = BufWriter::with_capacity(1 << 16, out);
         let bytes = match &self.part {
             // without a second copy of the fields, which may be large
             Part::Everything if self.format == Format::Json => {

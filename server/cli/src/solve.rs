@@ -68,7 +68,8 @@ impl Threads {
     /// The number of threads that may be used.
     pub(super) fn count(self) -> usize {
         let processors = || std::thread::available_parallelism().map_or(1, usize::from);
-        self.threads.map_or_else(processors, usize::from)
+        self.threads
+            .map_or_else(|| processors().min(2), usize::from)
     }
 }
 
